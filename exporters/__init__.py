@@ -1,0 +1,1 @@
+"""How it leaves: autopilot and ECDIS files, the recording, pictures."""

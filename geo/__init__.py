@@ -1,0 +1,1 @@
+"""What the world is: frame, GeoJSON to `Scenario`, geometry checks, grids, shortest paths around obstacles."""

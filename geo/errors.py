@@ -1,0 +1,13 @@
+"""The errors that a user can cause."""
+
+
+class QuarterdeckError(Exception):
+    """Base of all errors that Quarterdeck raises on purpose; its text is one line meant for the user."""
+
+
+class InputError(QuarterdeckError, ValueError):
+    """The input is wrong. The text names the feature, the place in the file and what to do; exit status 2."""
+
+
+class UnavailableError(QuarterdeckError, RuntimeError):
+    """Something that this machine lacks is needed, such as PyBullet. The text says how to get it; exit status 2."""

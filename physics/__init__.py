@@ -1,0 +1,1 @@
+"""Whether it works: the PyBullet world, vehicles, guidance, sensing, faults; `Trace` and `Report`."""

@@ -1,0 +1,82 @@
+"""The command line: one file a verb, imported only when it is called."""
+
+import os
+import sys
+from difflib import get_close_matches
+from importlib import import_module
+
+import click
+
+from quarterdeck import __version__
+from quarterdeck.geo.errors import QuarterdeckError
+
+VERBS = {
+    "reproduce": "A paper's tables beside ours.",
+}
+
+
+class LazyGroup(click.Group):
+    """A group whose commands are modules with a `command`, imported only when called: `--help` stays fast.
+
+    `package` holds the modules, `verbs` maps a command's name, which is its module's, to its one line of help.
+    """
+
+    def __init__(self, package: str, verbs: dict[str, str], **attributes: object) -> None:
+        super().__init__(**attributes)  # type: ignore[arg-type]
+        self.package = package
+        self.verbs = verbs
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
+        """Return the names of the commands."""
+        return sorted(self.verbs)
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:  # noqa: ARG002
+        """Import and return a command."""
+        return import_module(f"{self.package}.{name}").command if name in self.verbs else None
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """Write the list of commands without importing any."""
+        with formatter.section("Commands"):
+            formatter.write_dl(sorted(self.verbs.items()))
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command, or suggest the nearest."""
+        if args and args[0] not in self.verbs and not args[0].startswith("-"):
+            near = get_close_matches(args[0], self.verbs, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(sorted(self.verbs))}"
+            ctx.fail(f"No such command {args[0]!r}; {hint}")
+        return super().resolve_command(ctx, args)
+
+
+@click.command(
+    cls=LazyGroup,
+    package="quarterdeck.cli",
+    verbs=VERBS,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="Exit status: 0 done; 1 the mission is infeasible or the verdict fails; 2 wrong input or usage; 130 stopped.",
+)
+@click.version_option(__version__, prog_name="quarterdeck")
+def group() -> None:
+    """Plan, prove and export missions for fleets on land, at sea and in the air."""
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the command line: our own errors are one line on stderr and exit status 2."""
+    try:
+        status = group.main(args=args, prog_name="quarterdeck", standalone_mode=False)
+    except QuarterdeckError as error:
+        _stop(f"quarterdeck: {error}", 2)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(error.exit_code)
+    except (click.Abort, KeyboardInterrupt):
+        _stop("quarterdeck: interrupted", 130)
+    except BrokenPipeError:  # the reader of our standard output has gone: nothing is wrong
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+def _stop(text: str, status: int) -> None:
+    click.echo(text, err=True)
+    sys.exit(status)

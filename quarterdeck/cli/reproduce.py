@@ -1,0 +1,12 @@
+"""`quarterdeck reproduce`: the papers' tables beside ours."""
+
+import click
+
+from quarterdeck.cli import LazyGroup
+
+PAPERS: dict[str, str] = {}
+
+
+@click.command(cls=LazyGroup, package="quarterdeck.reproduce", verbs=PAPERS)
+def command() -> None:
+    """Print a paper's tables beside ours, with what matches, what does not and why."""

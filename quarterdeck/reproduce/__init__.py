@@ -1,0 +1,1 @@
+"""The studies that reproduce the four papers, a file each."""
