@@ -1,0 +1,335 @@
+"""From a site's GeoJSON to a `Scenario`: everything is checked here, once, and every problem told with its place."""
+
+import hashlib
+import sys
+from collections.abc import Sequence
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from shapely import MultiPoint, MultiPolygon, Point
+from shapely.ops import unary_union
+
+from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.frame import Frame
+from quarterdeck.geo.geojson import parse, position_problem, positions, read_polygon
+from quarterdeck.geo.models import DEFAULT_MODEL, load_model
+from quarterdeck.geo.properties import GEOMETRIES, POLYGONS, property_problems
+from quarterdeck.geo.scenario import (
+    DOMAINS,
+    Area,
+    Casualty,
+    Obstacle,
+    Precedence,
+    Scenario,
+    Sensor,
+    Site,
+    Task,
+    Vehicle,
+    as_multipolygon,
+)
+
+MAX_RADIUS = 200_000.0  # m from the frame's origin: beyond it the projection's scale is off by more than 0.05 %
+
+
+def read_scenario(source: str | Path) -> Scenario:
+    """Return the scenario in a GeoJSON file; `-` reads standard input.
+
+    Raises InputError with the first problem, in one line that names the feature, its place and what to do.
+    """
+    data = read_bytes(source)
+    name = "standard input" if str(source) == "-" else str(source)
+    try:
+        scenario, problems = _read(data, _name(source))
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
+    if scenario is None:
+        more = f" (and {len(problems) - 1} more; `quarterdeck check` lists them)" if len(problems) > 1 else ""
+        raise InputError(f"{name}: {problems[0]}{more}")
+    return scenario
+
+
+def find_problems(source: str | Path) -> list[str]:
+    """Return every problem of a site's file, one line each; none if it can be read."""
+    try:
+        return _read(read_bytes(source), _name(source))[1]
+    except InputError as error:
+        return [str(error)]
+
+
+def read_bytes(source: str | Path) -> bytes:
+    """Return the bytes of a file, or of standard input for `-`. Raises InputError if it cannot be read."""
+    if str(source) == "-":
+        return sys.stdin.buffer.read()
+    try:
+        return Path(source).read_bytes()
+    except OSError as error:
+        raise InputError(f"{source}: cannot be read ({error.strerror}); give the path of a GeoJSON file") from None
+
+
+def _name(source: str | Path) -> str:
+    return "site" if str(source) == "-" else Path(source).stem
+
+
+def _read(data: bytes, name: str) -> tuple[Scenario | None, list[str]]:
+    """Return the scenario, or None, and all problems found."""
+    document = parse(data)
+    problems: list[str] = []
+    features = [f for i, raw in enumerate(document["features"]) if (f := _feature(i, raw, problems))]
+    if not any(f["role"] == "area" or f["role"] in ("task", "casualty") for f in features) and not problems:
+        problems.append('no feature has the role "area" or "task"; give the polygon to be covered "role": "area"')
+    if problems:
+        return None, problems
+    frame = _frame(features, problems)
+    if problems:
+        return None, problems
+    shapes = _shapes(features, frame, problems)
+    if problems:
+        return None, problems
+    spacings = sorted({f["properties"]["spacing"] for f in features if f["properties"].get("spacing") is not None})
+    if len(spacings) > 1:
+        problems.append(f"areas give different spacings ({', '.join(f'{s:g}' for s in spacings)}); give one")
+    vehicles = [_vehicle(f, frame, problems) for f in features if f["role"] == "vehicle"]
+    if problems:
+        return None, problems
+    fleet = tuple(v for v in vehicles if v is not None)
+    tasks = tuple(_task(f, frame) for f in features if f["role"] == "task")
+    points = {role: tuple((f["id"], _xy(f, frame)) for f in features if f["role"] == role) for role in GEOMETRIES}
+    site = _site(features, shapes, [*fleet, *tasks], [xy for r in points for _, xy in points[r]])
+    scenario = Scenario(
+        name=document["name"] if isinstance(document.get("name"), str) else name,
+        frame=frame,
+        site=site,
+        vehicles=fleet,
+        tasks=tasks,
+        casualties=tuple(
+            Casualty(f["id"], _xy(f, frame), f["properties"].get("colour") or "red")
+            for f in features
+            if f["role"] == "casualty"
+        ),
+        medics=points["medic"],
+        rendezvous=points["rendezvous"],
+        spacing=spacings[0] if spacings else None,
+        input_hash=hashlib.sha256(data).hexdigest(),
+    )
+    problems += _vehicle_problems(features, scenario)
+    problems += _task_problems(scenario)
+    return (None if problems else scenario), problems
+
+
+def _feature(index: int, raw: Any, problems: list[str]) -> dict[str, Any] | None:
+    """Check one feature's form; return it with `place`, `role`, `id`, or None where it is wrong or not ours."""
+    place = f"features[{index}]"
+    if not isinstance(raw, dict) or raw.get("type") != "Feature":
+        problems.append(f'{place}: not a Feature; every item of "features" must be one')
+        return None
+    properties = raw.get("properties") or {}
+    if not isinstance(properties, dict):
+        problems.append(f"{place}: properties must be an object")
+        return None
+    given = properties.get("id") if properties.get("id") is not None else raw.get("id")
+    if given is not None:
+        place = f"{place} ({given!r})"
+    role = properties.get("role")
+    if role is None:
+        problems.append(f'{place}: has no role; give it the property "role": one of {", ".join(GEOMETRIES)}')
+        return None
+    if role not in GEOMETRIES:
+        near = get_close_matches(str(role), GEOMETRIES, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else f"use one of {', '.join(GEOMETRIES)}"
+        problems.append(f"{place}: unknown role {str(role)[:40]!r}; {hint}")
+        return None
+    geometry: dict[str, Any] = raw["geometry"] if isinstance(raw.get("geometry"), dict) else {}
+    kind = geometry.get("type")
+    if kind not in GEOMETRIES[role]:
+        problems.append(f"{place}: a feature of role {role} must be a {' or '.join(GEOMETRIES[role])}, not {kind}")
+        return None
+    found = [f"{place}: {p}" for p in property_problems(role, properties)]
+    if kind == "Point" and (problem := position_problem(geometry.get("coordinates"))):
+        found.append(f"{place}: {problem}")
+    if kind in POLYGONS:
+        wrong = next((p for p in map(position_problem, positions(geometry)) if p), None)
+        found += [f"{place}: {wrong}"] if wrong else []
+    problems += found
+    identity = str(given) if given is not None else f"{role}-{index}"
+    return None if found else {"place": place, "role": role, "id": identity, "geometry": geometry, "properties": properties}
+
+
+def _frame(features: Sequence[dict[str, Any]], problems: list[str]) -> Frame:
+    """Centre the frame on what is to be covered or visited, whatever the order of features, over any meridian."""
+    work = [f for f in features if f["role"] == "area"] or [
+        f for f in features if f["role"] in ("task", "casualty", "operating")
+    ]
+    lonlat = np.array([p[:2] for f in work for p in positions(f["geometry"])], dtype=float).reshape(-1, 2)
+    if not len(lonlat):
+        problems.append(f"{work[0]['place']}: the geometry has no positions")
+        return Frame(0.0, 0.0)
+    # Longitudes are unwrapped at the largest gap, so that a site over the antimeridian is one piece.
+    lon = np.sort(np.unique(lonlat[:, 0] % 360.0))
+    gaps = np.diff(np.append(lon, lon[0] + 360.0))
+    west = lon[(int(gaps.argmax()) + 1) % len(lon)]
+    east = west + (360.0 - gaps.max())
+    centre = ((west + east) / 2 + 180.0) % 360.0 - 180.0
+    return Frame(round(float(centre), 7), round(float(lonlat[:, 1].min() + lonlat[:, 1].max()) / 2, 7))
+
+
+def _shapes(features: Sequence[dict[str, Any]], frame: Frame, problems: list[str]) -> dict[str, MultiPolygon]:
+    """Return each polygon feature's shape in metres, by place."""
+    shapes = {}
+    for f in features:
+        xy = frame.to_metres(np.array([p[:2] for p in positions(f["geometry"])], dtype=float))
+        far = float(np.hypot(*xy.T).max()) if np.isfinite(xy).all() else float("inf")
+        if far > MAX_RADIUS and f["role"] in ("vehicle", "task", "casualty", "medic", "rendezvous"):
+            problems.append(
+                f"{f['place']}: is {far / 1000:,.0f} km from the site's centre, more than {MAX_RADIUS / 1000:.0f} km"
+            )
+        elif far > MAX_RADIUS:
+            problems.append(f"{f['place']}: reaches {far / 1000:,.0f} km from the site's centre, more than "
+                            f"{MAX_RADIUS / 1000:.0f} km; split it into sites")  # fmt: skip
+        elif f["geometry"]["type"] in POLYGONS:
+            try:
+                shapes[f["place"]] = read_polygon(f["geometry"], frame)
+            except InputError as error:
+                problems.append(f"{f['place']}: {error}")
+    return shapes
+
+
+def _xy(feature: dict[str, Any], frame: Frame) -> tuple[float, float]:
+    x, y = frame.to_metres(np.array(feature["geometry"]["coordinates"][:2], dtype=float))[0]
+    return float(x), float(y)
+
+
+def _vehicle(feature: dict[str, Any], frame: Frame, problems: list[str]) -> Vehicle | None:
+    """Return a vehicle, its model's figures where it gives none of its own."""
+    given = {k: v for k, v in feature["properties"].items() if v is not None}
+    try:
+        model = load_model(given.get("model") or DEFAULT_MODEL[given.get("domain", "surface")])
+    except InputError as error:
+        problems.append(f"{feature['place']}: {error}")
+        return None
+    if given.get("domain", model.domain) != model.domain:
+        problems.append(f"{feature['place']}: domain {given['domain']} contradicts model {model.name} ({model.domain})")
+        return None
+    if given.get("speed", 0) > model.max_speed:
+        problems.append(f"{feature['place']}: speed {given['speed']:g} m/s exceeds {model.name}'s {model.max_speed:g} m/s")
+        return None
+    end = None
+    if "end" in given:
+        if problem := position_problem(given["end"]):
+            problems.append(f"{feature['place']}: end: {problem}")
+            return None
+        x, y = frame.to_metres(np.array(given["end"][:2], dtype=float))[0]
+        if not np.hypot(x, y) <= MAX_RADIUS:
+            problems.append(f"{feature['place']}: end is more than {MAX_RADIUS / 1000:.0f} km from the site's centre")
+            return None
+        end = (float(x), float(y))
+    return Vehicle(
+        id=feature["id"],
+        model=model,
+        start=_xy(feature, frame),
+        end=end,
+        share=given.get("share"),
+        speed=float(given.get("speed", model.speed)),
+        turn_radius=float(given.get("turn_radius", model.turn_radius)),
+        clearance=float(given.get("clearance", model.clearance)),
+        endurance=float(given.get("endurance", float("inf"))),
+        battery=float(given.get("battery", model.battery)),
+        altitude=float(given.get("altitude", model.altitude)) if model.domain == "aerial" else 0.0,
+        sensor=_sensor(given["sensor"]) if "sensor" in given else None,
+        range=given.get("range"),
+        can=frozenset(given.get("can", ())),
+    )
+
+
+def _sensor(given: dict[str, Any]) -> Sensor:
+    figures = {
+        k: float(v) for k, v in given.items() if isinstance(v, int | float) and not isinstance(v, bool) and k != "swath"
+    }
+    return Sensor(given["kind"], given.get("swath"), figures)
+
+
+def _task(feature: dict[str, Any], frame: Frame) -> Task:
+    given = {k: v for k, v in feature["properties"].items() if v is not None}
+    after = tuple(Precedence(a) if isinstance(a, str) else Precedence(**a) for a in given.get("after", ()))
+    low, high = given.get("window", (0.0, float("inf")))
+    return Task(
+        id=feature["id"],
+        position=_xy(feature, frame),
+        priority=given.get("priority", 0),
+        service_time=float(given.get("service_time", 0.0)),
+        after=after,
+        needs=frozenset(given.get("needs", ())),
+        domain=given.get("domain"),
+        window=(float(low), float(high)),
+    )
+
+
+def _site(
+    features: Sequence[dict[str, Any]],
+    shapes: dict[str, MultiPolygon],
+    actors: Sequence[Vehicle | Task],
+    points: Sequence[tuple[float, float]],
+) -> Site:
+    """Put the site together; without an operating area it is the hull of all that is to be reached, and clearance."""
+    areas = [
+        Area(f["id"], shapes[f["place"]], f["properties"].get("priority") or 0) for f in features if f["role"] == "area"
+    ]
+    obstacles = [
+        Obstacle(p_id, part, blocks, height)
+        for f in features
+        if f["role"] == "obstacle"
+        for p_id, part, blocks, height in _obstacle_parts(f, shapes[f["place"]])
+    ]
+    operating = [shapes[f["place"]] for f in features if f["role"] == "operating"]
+    if operating:
+        return Site(tuple(areas), as_multipolygon(unary_union(operating)), tuple(obstacles))
+    vehicles = [a for a in actors if isinstance(a, Vehicle)]
+    reach = [*points, *(v.home for v in vehicles)]
+    hull = unary_union([*(a.polygon for a in areas), MultiPoint(reach)]).convex_hull
+    margin = max((v.clearance for v in vehicles), default=0.0) + max((2 * v.turn_radius for v in vehicles), default=0.0)
+    return Site(tuple(areas), as_multipolygon(hull.buffer(max(margin, 1.0), quad_segs=8)), tuple(obstacles))
+
+
+def _obstacle_parts(feature: dict[str, Any], shape: MultiPolygon) -> list[tuple[str, Any, frozenset[str], float]]:
+    given = feature["properties"]
+    blocks = frozenset(DOMAINS if given.get("blocks") is None else given["blocks"])
+    height = float(given.get("height") or 10.0)
+    ids = [feature["id"]] if len(shape.geoms) == 1 else [f"{feature['id']}/{i}" for i in range(len(shape.geoms))]
+    return [(i, part, blocks, height) for i, part in zip(ids, shape.geoms, strict=True)]
+
+
+def _vehicle_problems(features: Sequence[dict[str, Any]], scenario: Scenario) -> list[str]:
+    problems: list[str] = []
+    seen: dict[str, str] = {}
+    site = scenario.site
+    for f, vehicle in zip([f for f in features if f["role"] == "vehicle"], scenario.vehicles, strict=True):
+        if vehicle.id in seen:
+            problems.append(f"{f['place']}: the id {vehicle.id!r} belongs to {seen[vehicle.id]} too; give each its own")
+        seen[vehicle.id] = f["place"]
+        for what, xy in (("stands", vehicle.start), ("ends", vehicle.home)):
+            point = Point(xy)
+            inside = [o.id for o in site.obstacles if vehicle.domain in o.blocks and o.polygon.contains(point)]
+            if inside:
+                problems.append(f"{f['place']}: {what} inside obstacle {inside[0]!r}; move it out")
+            elif not site.operating.covers(point):
+                problems.append(
+                    f"{f['place']}: {what} outside the operating area, by {site.operating.distance(point):,.0f} m"
+                )
+            if vehicle.end is None:
+                break
+    return problems
+
+
+def _task_problems(scenario: Scenario) -> list[str]:
+    ids = [t.id for t in scenario.tasks]
+    problems = [f"task {i!r}: its id is given twice" for i in sorted({i for i in ids if ids.count(i) > 1})]
+    for task in scenario.tasks:
+        for before in task.after:
+            if before.task not in ids:
+                near = get_close_matches(before.task, ids, n=1)
+                hint = f"; did you mean {near[0]!r}?" if near else ""
+                problems.append(f"task {task.id!r}: after names the unknown task {before.task!r}{hint}")
+        if not 0 <= task.window[0] <= task.window[1]:
+            problems.append(f"task {task.id!r}: window {list(task.window)} must be [earliest, latest], earliest first")
+    return problems
