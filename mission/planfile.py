@@ -1,0 +1,269 @@
+"""The PLAN file: a mission as GeoJSON that opens in any viewer, and holds all that the next step needs.
+
+Its first feature has no geometry and `role: plan`: the header. Then the site, the vehicles and tasks, a LineString a route
+with its waypoints' figures as lists, and the layers for the eye. The same mission gives the same bytes.
+"""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from shapely import MultiPolygon, Polygon, get_coordinates, orient_polygons, set_coordinates
+from shapely.geometry import mapping, shape
+
+from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.frame import Frame
+from quarterdeck.geo.geojson import parse
+from quarterdeck.geo.models import VehicleModel
+from quarterdeck.geo.reader import read_bytes
+from quarterdeck.geo.scenario import Area, Casualty, Obstacle, Precedence, Sensor, Site, Task, Vehicle, as_multipolygon
+from quarterdeck.mission.mission import Layer, Mission, Route, Waypoint
+
+FORMAT = 1
+COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#ff7f0e", "#9467bd", "#8c564b", "#e377c2", "#17becf", "#bcbd22", "#7f7f7f")
+LISTS = ("leg", "speed", "hold", "time", "task")  # of a route's waypoints, in the order of its positions
+
+
+def plan_text(mission: Mission) -> str:
+    """Return the PLAN file's text, one feature a line."""
+    features = [_header(mission), *_site(mission), *_fleet(mission), *_layers(mission), *_routes(mission)]
+    lines = ",\n".join(json.dumps(f, allow_nan=False, ensure_ascii=False, separators=(", ", ": ")) for f in features)
+    name = json.dumps(mission.name, ensure_ascii=False)
+    return f'{{"type": "FeatureCollection", "name": {name}, "features": [\n{lines}\n]}}\n'
+
+
+def _feature(role: str, geometry: Any, identity: str | None = None, **properties: Any) -> dict[str, Any]:
+    head = {"type": "Feature"} | ({"id": identity} if identity is not None else {})
+    return head | {"properties": {"role": role} | properties, "geometry": geometry}
+
+
+def _header(mission: Mission) -> dict[str, Any]:
+    return _feature(
+        "plan",
+        None,
+        format=FORMAT,
+        version=mission.version,
+        method=mission.method,
+        feasible=mission.feasible,
+        reasons=list(mission.reasons),
+        seed=mission.seed,
+        spacing=mission.spacing,
+        origin=[mission.frame.lon, mission.frame.lat],
+        parameters=_plain(mission.parameters),
+        figures=_plain(mission.figures),
+        bounds=_plain(mission.bounds),
+        input_hash=mission.input_hash,
+    )
+
+
+def _plain(value: Any) -> Any:
+    """Return JSON's own types: numpy's become Python's, what is not finite becomes null, figures keep 12 digits."""
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray | list | tuple):
+        return [_plain(v) for v in (value.tolist() if isinstance(value, np.ndarray) else value)]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float):
+        return float(f"{value:.12g}") if math.isfinite(value) else None
+    return value
+
+
+def _geometry(frame: Frame, geometry: Any) -> dict[str, Any]:
+    """Return a shapely geometry in metres as GeoJSON in degrees, 9 decimals, rings wound as RFC 7946 says."""
+    if isinstance(geometry, Polygon | MultiPolygon):
+        geometry = orient_polygons(geometry)
+        if isinstance(geometry, MultiPolygon) and len(geometry.geoms) == 1:
+            geometry = geometry.geoms[0]
+    return dict(mapping(set_coordinates(geometry, _degrees(frame, get_coordinates(geometry)))))
+
+
+def _degrees(frame: Frame, xy: Any) -> np.ndarray:
+    return np.round(frame.to_degrees(np.asarray(xy, dtype=float)), 9)
+
+
+def _point(frame: Frame, xy: tuple[float, float]) -> list[float]:
+    return _degrees(frame, [xy])[0].tolist()
+
+
+def _site(mission: Mission) -> list[dict[str, Any]]:
+    style = {"operating": ("#555555", 0.0), "area": ("#2b8cbe", 0.08), "obstacle": ("#a63603", 0.5)}
+
+    def feature(role: str, polygon: Any, identity: str | None = None, **properties: Any) -> dict[str, Any]:
+        colour, opacity = style[role]
+        look = {"stroke": colour, "stroke-width": 1, "fill": colour, "fill-opacity": opacity}
+        return _feature(role, _geometry(mission.frame, polygon), identity, **properties, **look)
+
+    site = mission.site
+    return [
+        feature("operating", site.operating),
+        *(feature("area", a.polygon, a.id, priority=a.priority) for a in site.areas),
+        *(feature("obstacle", o.polygon, o.id, blocks=sorted(o.blocks), height=o.height) for o in site.obstacles),
+    ]
+
+
+def _fleet(mission: Mission) -> list[dict[str, Any]]:
+    frame = mission.frame
+    features = []
+    for i, v in enumerate(mission.vehicles):
+        given: dict[str, Any] = {"model": _plain(asdict(v.model))} | {n: getattr(v, n) for n in VEHICLE_FIGURES}
+        given |= {"sensor": asdict(v.sensor) if v.sensor else None, "can": sorted(v.can)}
+        given |= {"end": _point(frame, v.end) if v.end else None, "marker-color": COLOURS[i % len(COLOURS)]}
+        features.append(
+            _feature("vehicle", {"type": "Point", "coordinates": _point(frame, v.start)}, v.id, **_plain(given))
+        )
+    for t in mission.tasks:
+        given = {k: v for k, v in asdict(t).items() if k not in ("id", "position")} | {"needs": sorted(t.needs)}
+        place = {"type": "Point", "coordinates": _point(frame, t.position)}
+        features.append(_feature("task", place, t.id, **_plain(given)))
+    for c in mission.casualties:
+        place = {"type": "Point", "coordinates": _point(frame, c.position)}
+        features.append(_feature("casualty", place, c.id, colour=c.colour))
+    return features
+
+
+VEHICLE_FIGURES = ("share", "speed", "turn_radius", "clearance", "endurance", "battery", "altitude", "range")
+
+
+def _layers(mission: Mission) -> list[dict[str, Any]]:
+    return [
+        _feature("layer", _geometry(mission.frame, geometry), layer=layer.name, **_plain(properties))
+        for layer in mission.layers
+        for geometry, properties in zip(layer.geometries, layer.properties, strict=True)
+    ]
+
+
+def _routes(mission: Mission) -> list[dict[str, Any]]:
+    features = []
+    for i, route in enumerate(mission.routes):
+        xyz = route.xyz
+        lonlat = _degrees(mission.frame, xyz[:, :2])
+        with_z = bool(np.any(xyz[:, 2] != 0))
+        line = np.column_stack([lonlat, np.round(xyz[:, 2], 3)]).tolist() if with_z else lonlat.tolist()
+        lists = {name: [getattr(w, name) for w in route.waypoints] for name in LISTS}
+        lists["time"] = [round(t, 3) for t in lists["time"]]
+        lists["speed"] = [round(s, 4) for s in lists["speed"]]
+        if not any(lists["task"]):
+            del lists["task"]
+        figures = {"energy": route.energy, "length": round(route.length, 2), "duration": round(route.duration, 2)}
+        look: dict[str, Any] = {"stroke": COLOURS[i % len(COLOURS)], "stroke-width": 2}
+        geometry = {"type": "LineString", "coordinates": line if len(line) > 1 else line * 2}
+        features.append(_feature("route", geometry, vehicle=route.vehicle, **look, **_plain(figures), **_plain(lists)))
+    return features
+
+
+def read_plan(source: str | Path) -> Mission:
+    """Return the mission in a PLAN file; `-` reads standard input.
+
+    Raises InputError if it is no plan, or a part of it is missing or damaged.
+    """
+    name = "standard input" if str(source) == "-" else str(source)
+    try:
+        document = parse(read_bytes(source))
+        features = [f for f in document["features"] if isinstance(f, dict) and isinstance(f.get("properties"), dict)]
+        headers = [f["properties"] for f in features if f["properties"].get("role") == "plan"]
+        if not headers:
+            raise InputError("is a site or another GeoJSON, not a PLAN; make one with `quarterdeck plan`")
+        if headers[0].get("format") != FORMAT:
+            raise InputError(f"is a PLAN of format {headers[0].get('format')}, this version reads {FORMAT}; plan it again")
+        try:
+            return _mission(str(document.get("name", "")), headers[0], features)
+        except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+            raise InputError(f"is a damaged PLAN ({type(error).__name__}: {error}); plan it again") from None
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
+
+
+def _mission(name: str, header: dict[str, Any], features: list[dict[str, Any]]) -> Mission:
+    frame = Frame(*map(float, header["origin"]))
+
+    def of(role: str) -> list[dict[str, Any]]:
+        return [f for f in features if f["properties"]["role"] == role]
+
+    def metres(f: dict[str, Any]) -> Any:
+        geometry = shape(f["geometry"])
+        return set_coordinates(geometry, frame.to_metres(get_coordinates(geometry)))
+
+    site = Site(
+        areas=tuple(Area(f["id"], as_multipolygon(metres(f)), f["properties"]["priority"]) for f in of("area")),
+        operating=as_multipolygon(metres(of("operating")[0])),
+        obstacles=tuple(
+            Obstacle(f["id"], metres(f), frozenset(f["properties"]["blocks"]), f["properties"]["height"])
+            for f in of("obstacle")
+        ),
+    )
+    layers: dict[str, list[tuple[Any, dict[str, Any]]]] = {}
+    for f in of("layer"):
+        properties = {k: v for k, v in f["properties"].items() if k not in ("role", "layer")}
+        layers.setdefault(f["properties"]["layer"], []).append((metres(f), properties))
+    return Mission(
+        name=name,
+        frame=frame,
+        site=site,
+        vehicles=tuple(_vehicle(f, frame) for f in of("vehicle")),
+        routes=tuple(_route(f, frame) for f in of("route")),
+        method=header["method"],
+        parameters=header["parameters"],
+        seed=header["seed"],
+        spacing=header["spacing"],
+        tasks=tuple(_task(f, frame) for f in of("task")),
+        casualties=tuple(Casualty(f["id"], _xy(f, frame), f["properties"]["colour"]) for f in of("casualty")),
+        figures=header["figures"],
+        bounds=header["bounds"],
+        reasons=tuple(header["reasons"]),
+        layers=tuple(Layer(n, tuple(g for g, _ in items), tuple(p for _, p in items)) for n, items in layers.items()),
+        input_hash=header["input_hash"],
+        version=header["version"],
+    )
+
+
+def _xy(feature: dict[str, Any], frame: Frame) -> tuple[float, float]:
+    return _metres(feature["geometry"]["coordinates"], frame)
+
+
+def _metres(lonlat: list[float], frame: Frame) -> tuple[float, float]:
+    x, y = frame.to_metres(np.array(lonlat[:2], dtype=float))[0]
+    return float(x), float(y)
+
+
+def _vehicle(feature: dict[str, Any], frame: Frame) -> Vehicle:
+    given = feature["properties"]
+    figures = {n: given[n] for n in VEHICLE_FIGURES}
+    for unlimited in ("endurance", "battery"):
+        figures[unlimited] = math.inf if figures[unlimited] is None else figures[unlimited]
+    return Vehicle(
+        id=feature["id"],
+        model=VehicleModel(**given["model"]),
+        start=_xy(feature, frame),
+        end=_metres(given["end"], frame) if given["end"] else None,
+        sensor=Sensor(**given["sensor"]) if given["sensor"] else None,
+        can=frozenset(given["can"]),
+        **figures,
+    )
+
+
+def _task(feature: dict[str, Any], frame: Frame) -> Task:
+    given = {f.name: feature["properties"][f.name] for f in fields(Task) if f.name not in ("id", "position")}
+    low, high = given["window"]
+    given |= {"window": (low, math.inf if high is None else high), "needs": frozenset(given["needs"])}
+    given |= {"after": tuple(Precedence(**a) for a in given["after"])}
+    return Task(id=feature["id"], position=_xy(feature, frame), **given)
+
+
+def _route(feature: dict[str, Any], frame: Frame) -> Route:
+    given = feature["properties"]
+    line = np.array(feature["geometry"]["coordinates"], dtype=float)[: len(given["leg"])]
+    xy = frame.to_metres(line[:, :2])
+    z = line[:, 2] if line.shape[1] > 2 else np.zeros(len(line))
+    columns = [given.get(name) or [None] * len(line) for name in LISTS]
+    if any(len(c) != len(line) for c in columns):
+        raise ValueError(f"route of {given['vehicle']}: lists of different lengths")
+    waypoints = tuple(
+        Waypoint(float(x), float(y), float(h), leg, speed, hold, time, task)
+        for (x, y), h, leg, speed, hold, time, task in zip(xy, z, *columns, strict=True)
+    )
+    return Route(given["vehicle"], waypoints, given["energy"])
