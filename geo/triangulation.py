@@ -95,9 +95,8 @@ def _triangulate(
     if not len(faces):
         if len(given):
             raise TriangulationError(f"point {_text(given[0])} is outside; move it inside")
-        return Triangulation(
-            np.empty((0, 2)), *(np.empty((0, 3), dtype=np.int32) for _ in range(2)), np.empty(0, dtype=int)
-        )
+        none = np.empty((0, 3), dtype=np.int32)
+        return Triangulation(np.empty((0, 2)), none, none, np.empty(0, dtype=np.int64))
     vertices, ends, of_point = _unique(lines, given, grid)
     triangles = _BACKENDS[backend](vertices, ends)
     triangles = _inside(vertices, triangles, ends, faces)
