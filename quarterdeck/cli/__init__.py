@@ -11,6 +11,7 @@ from quarterdeck import __version__
 from quarterdeck.geo.errors import QuarterdeckError
 
 VERBS = {
+    "init": "A small site to start from.",
     "reproduce": "A paper's tables beside ours.",
 }
 

@@ -1,0 +1,45 @@
+# demo test lint bench soak docs: what each does stands beside it. `make demo` and `make test` make their own environment.
+export PYTHONSAFEPATH = 1
+VENV ?= .venv
+BIN = $(VENV)/bin
+OUT ?= out
+
+.PHONY: demo test lint bench bench-coverage bench-physics bench-assign soak docs clean
+
+$(VENV)/installed: pyproject.toml
+	python3 -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet --editable '.[charts,cluster]' --group test
+	touch $@
+
+demo: $(VENV)/installed  ## plan, simulate, draw and export a real site
+	$(BIN)/quarterdeck plan data/west_ant_island.geojson -o $(OUT)/west_ant_island.plan.geojson --force
+	$(BIN)/quarterdeck simulate $(OUT)/west_ant_island.plan.geojson --report $(OUT)/report.json --rrd $(OUT)/run.rrd --picture $(OUT)/run.png --force
+	$(BIN)/quarterdeck export $(OUT)/west_ant_island.plan.geojson --to qgc-wpl,geojson,png,rerun -o $(OUT)/ --force
+
+test: lint  ## everything that must hold
+	$(BIN)/python -m pytest --cov --cov-report=term:skip-covered
+
+lint: $(VENV)/installed  ## style, types and layers
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: bench-coverage bench-physics bench-assign  ## ratios, not tests: minutes
+
+bench-coverage: $(VENV)/installed
+	$(BIN)/python benchmarks/coverage_table.py
+
+bench-physics: $(VENV)/installed
+	$(BIN)/python benchmarks/simulation.py --table
+
+bench-assign: $(VENV)/installed
+	$(BIN)/python -m pip install --quiet pyvrp ortools
+	$(BIN)/python benchmarks/assignment.py --table
+
+docs: $(VENV)/installed  ## what is generated in docs/: the format of sites
+	$(BIN)/python docs/generate.py
+
+clean:
+	rm -rf $(VENV) $(OUT) build dist *.egg-info

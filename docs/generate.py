@@ -1,0 +1,75 @@
+"""Write what is generated: docs/geojson.md and geo/site.schema.json, both from geo/properties.py. `make docs` runs it."""
+
+import json
+from pathlib import Path
+
+from quarterdeck.geo.properties import GEOMETRIES, PROPERTIES, json_schema
+
+ROOT = Path(__file__).parents[1]
+
+INTRODUCTION = """# The GeoJSON that you write
+
+Made by `make docs` from `geo/properties.py`; the JSON Schema is `geo/site.schema.json` and ships with the package.
+
+A site is a FeatureCollection (RFC 7946) in WGS84, longitude before latitude. Draw it in QGIS, geojson.io or beside a chart,
+and give each feature a `role`. `quarterdeck check SITE` lists every problem with its place; `quarterdeck init` writes a
+sample to start from.
+
+What is repaired silently: ring direction, repeated vertices, obstacles that overlap each other or the border. What is
+refused, because what was meant is not known: a ring that is unclosed or crosses itself, fewer than 4 positions, a `crs`
+other than WGS84, coordinates out of range, a site that reaches more than 200 km from its centre. A property that is `null`
+counts as absent. Properties that are not ours are ignored, unless they look like a misspelling of one that is.
+
+| `role` | geometry | what it is |
+|---|---|---|
+"""
+
+MEANINGS = {
+    "area": "to be covered; several allowed",
+    "operating": "where vehicles may move, hence the fence; default: the hull of areas, starts and tasks, with clearance",
+    "obstacle": "never covered; crossed only by the domains that it does not block",
+    "vehicle": "where a vehicle starts; several may share a point",
+    "task": "a place to visit (`quarterdeck assign`)",
+    "casualty": "somebody to be found (`quarterdeck triage`)",
+    "medic": "where a medic starts (`quarterdeck triage`)",
+    "rendezvous": "where UGVs and UAV meet (`quarterdeck triage`)",
+}
+
+EXAMPLES = {
+    "area": '{"role": "area", "spacing": 40}',
+    "operating": '{"role": "operating"}',
+    "obstacle": '{"role": "obstacle", "id": "islet", "blocks": ["surface", "ground"], "height": 12}',
+    "vehicle": '{"role": "vehicle", "id": "usv-1", "model": "otter", "share": 0.4, "clearance": 15}',
+    "task": '{"role": "task", "id": "valve", "priority": 2, "after": [{"task": "pump", "mode": "same_robot"}]}',
+    "casualty": '{"role": "casualty", "id": "c1", "colour": "yellow"}',
+    "medic": '{"role": "medic", "id": "medic-1"}',
+    "rendezvous": '{"role": "rendezvous", "id": "gate"}',
+}
+
+
+def geojson_page() -> str:
+    """Return docs/geojson.md."""
+    lines = [INTRODUCTION.rstrip("\n")]
+    lines += [f"| `{role}` | {' or '.join(kinds)} | {MEANINGS[role]} |" for role, kinds in GEOMETRIES.items()]
+    for role, properties in PROPERTIES.items():
+        lines += [
+            "",
+            f"## {role}",
+            "",
+            f"Properties of an example: `{EXAMPLES[role]}`",
+            "",
+            "| property | value | meaning |",
+        ]
+        lines += ["|---|---|---|"]
+        lines += [f"| `{name}` | {known.words} | {known.meaning} |" for name, known in properties.items()]
+    return "\n".join(lines) + "\n"
+
+
+def schema_text() -> str:
+    """Return geo/site.schema.json."""
+    return json.dumps(json_schema(), indent=1) + "\n"
+
+
+if __name__ == "__main__":
+    (ROOT / "docs" / "geojson.md").write_text(geojson_page(), encoding="utf-8")
+    (ROOT / "geo" / "site.schema.json").write_text(schema_text(), encoding="utf-8")

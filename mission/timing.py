@@ -1,0 +1,83 @@
+"""When a vehicle is where, and what it uses: speeds, turns, climbs and holds along a path."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from quarterdeck.geo.scenario import Vehicle
+from quarterdeck.mission.mission import Leg, Route, Waypoint
+
+RESERVE = 0.2  # of battery and endurance, kept for wind, current and age
+
+
+def timed_route(
+    vehicle: Vehicle,
+    points: np.ndarray,
+    legs: Sequence[Leg],
+    *,
+    holds: Sequence[float] | None = None,
+    tasks: Sequence[str | None] | None = None,
+) -> Route:
+    """Return the route along (n, 3) `points` in metres, its times and energy filled in.
+
+    `legs[i]` is the kind of the leg that ends at point i, `holds[i]` the seconds waited there, `tasks[i]` what is done.
+    A leg takes its length at the vehicle's speed, or its climb at the climb rate where that is longer, plus the turn
+    before it (`turn_time`).
+    """
+    points = np.asarray(points, dtype=float).reshape(-1, 3)
+    waits = [0.0] * len(points) if holds is None else [float(h) for h in holds]
+    names = [None] * len(points) if tasks is None else list(tasks)
+    turns = turn_times(vehicle, points)
+    time = energy = 0.0
+    waypoints = []
+    for i, (x, y, z) in enumerate(points.tolist()):
+        speed = 0.0
+        if i:
+            flat = math.hypot(x - points[i - 1, 0], y - points[i - 1, 1])
+            climb = abs(z - points[i - 1, 2])
+            seconds = max(flat / vehicle.speed, climb / vehicle.model.climb_rate if climb else 0.0)
+            speed = math.hypot(flat, climb) / seconds if seconds else vehicle.speed
+            energy += vehicle.model.power(vehicle.speed if flat else 0.0) * (seconds + turns[i - 1])
+            time += seconds + turns[i - 1]
+        waypoints.append(Waypoint(x, y, z, legs[i], speed, waits[i], time, names[i]))
+        time += waits[i]
+        energy += vehicle.model.power_idle * waits[i]
+    return Route(vehicle.id, tuple(waypoints), energy / 3600.0)
+
+
+def turn_times(vehicle: Vehicle, points: np.ndarray) -> np.ndarray:
+    """Return (n,) seconds lost in the turn at each of (n, 2 or 3) points; none at the ends.
+
+    A vehicle with a turn radius drives the arc at speed. Without one, on the ground it stops, turns on the spot and speeds
+    up again; in the air it sheds the velocity of one leg for that of the next.
+    """
+    step = np.diff(np.asarray(points, dtype=float)[:, :2], axis=0)
+    heading = np.arctan2(step[:, 1], step[:, 0])
+    angle = np.zeros(len(points))
+    moving = np.hypot(*step.T) > 0
+    both = moving[:-1] & moving[1:]
+    angle[1:-1] = np.where(both, np.abs((np.diff(heading) + np.pi) % (2 * np.pi) - np.pi), 0.0)
+    if vehicle.turn_radius > 0:
+        return np.zeros(len(points))
+    stop = vehicle.speed / vehicle.model.acceleration
+    if vehicle.domain == "ground":
+        return np.where(angle > 1e-3, stop + angle / vehicle.model.turn_rate, 0.0)
+    return stop * np.sin(angle / 2)
+
+
+def shortfalls(vehicle: Vehicle, route: Route) -> list[str]:
+    """Return why the vehicle cannot do the route, one line each; none if it can, with `RESERVE` in hand."""
+    found = []
+    battery, endurance = vehicle.battery * (1 - RESERVE), vehicle.endurance * (1 - RESERVE)
+    if route.energy > battery:
+        found.append(
+            f"{vehicle.id}: needs {route.energy:.0f} Wh and has {battery:.0f} Wh "
+            f"({vehicle.battery:.0f} Wh less {RESERVE:.0%} reserve), short by {route.energy - battery:.0f} Wh"
+        )
+    if route.duration > endurance:
+        found.append(
+            f"{vehicle.id}: needs {route.duration:.0f} s and has {endurance:.0f} s "
+            f"({vehicle.endurance:.0f} s less {RESERVE:.0%} reserve), short by {route.duration - endurance:.0f} s"
+        )
+    return found

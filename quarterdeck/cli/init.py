@@ -1,0 +1,19 @@
+"""`quarterdeck init`: a small site to start from."""
+
+from importlib.resources import files
+
+import click
+
+from quarterdeck.cli.output import emit, force_option, output_option
+
+SAMPLES = {"sea": "west_ant_island", "harbour": "dalian_harbour", "ground": "plant_yard", "air": "farm_survey"}
+
+
+@click.command(short_help="A small site to start from.")
+@click.argument("kind", type=click.Choice(list(SAMPLES)), default="sea")
+@output_option
+@force_option
+def command(kind: str, output: str, force: bool) -> None:
+    """Write a sample site as GeoJSON: change its shapes in QGIS or geojson.io, and its vehicles in any editor."""
+    text = (files("quarterdeck") / "data" / f"{SAMPLES[kind]}.geojson").read_text(encoding="utf-8")
+    emit(text, output, force=force)

@@ -1,0 +1,73 @@
+"""Where results and tables go: results to a file or standard output, tables and progress to standard error."""
+
+import sys
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+from quarterdeck.geo.files import write_file
+from quarterdeck.mission.mission import Mission
+
+output_option = click.option(
+    "-o", "--output", default="-", show_default=True, help="The file to write; - is standard output."
+)
+force_option = click.option("--force", is_flag=True, help="Overwrite existing files.")
+seed_option = click.option(
+    "--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Seed of all that is random."
+)
+
+
+def emit(text: str, output: str, *, force: bool) -> None:
+    """Write `text` to the file `output`, or to standard output for `-`."""
+    if output == "-":
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    else:
+        write_file(Path(output), text, force=force)
+
+
+def console() -> Console:
+    """Return the console on standard error."""
+    return Console(stderr=True, highlight=False)
+
+
+def print_figures(mission: Mission) -> None:
+    """Print a plan's figures and each vehicle's on standard error."""
+    screen = console()
+    table = Table(title=f"{mission.name}: {mission.method}", title_justify="left")
+    for column in ("vehicle", "share", "length", "time", "energy"):
+        table.add_column(column, justify="left" if column == "vehicle" else "right")
+    shares = mission.figures.get("shares")
+    for i, route in enumerate(mission.routes):
+        share = f"{100 * shares[i]:.2f} %" if shares is not None else ""
+        table.add_row(
+            route.vehicle, share, f"{route.length / 1000:.2f} km", minutes(route.duration), f"{route.energy:.0f} Wh"
+        )
+    screen.print(table)
+    known = {n: f for n, f in WORDS.items() if mission.figures.get(n) is not None}
+    screen.print(
+        "; ".join(f"{label} {form.format(mission.figures[n] * factor)}" for n, (label, form, factor) in known.items())
+    )
+    for reason in mission.reasons:
+        screen.print(f"[bold]infeasible:[/] {reason}", soft_wrap=True)
+
+
+WORDS = {
+    "poc": ("coverage", "{:.2f} %", 100.0),
+    "cell_poc": ("by cells", "{:.2f} %", 100.0),
+    "hypervertices": ("hypervertices", "{:,.0f}", 1.0),
+    "share_error_hypervertices": ("largest share error", "{:.2f} hypervertices", 1.0),
+    "turns": ("turns", "{:,.0f}", 1.0),
+    "length": ("survey length", "{:.2f} km", 0.001),
+    "overlap": ("overlap", "{:.1f} %", 100.0),
+    "makespan": ("makespan", "{:,.0f} s", 1.0),
+    "energy": ("energy", "{:,.0f} Wh", 1.0),
+}
+
+
+def minutes(seconds: float) -> str:
+    """Return seconds as h:mm:ss."""
+    whole = round(seconds)
+    return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"
