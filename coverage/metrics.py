@@ -67,12 +67,11 @@ def swath(tracks: Sequence[np.ndarray], spacing: float) -> Geometry:
 def straight_pieces(track: np.ndarray) -> np.ndarray:
     """Return the (m, 2, 2) straight pieces of an (n, 2) polyline, repeated points and collinear vertices left out."""
     track = np.asarray(track, dtype=float).reshape(-1, 2)
+    track = track[np.append(True, (np.diff(track, axis=0) != 0).any(axis=1))[: len(track)]]
     if len(track) == 1:
         return np.stack([track, track], axis=1)
-    track = track[np.concatenate([[True], (np.diff(track, axis=0) != 0).any(axis=1)])] if len(track) else track
-    corner = np.concatenate([[True], np.abs(_bends(track)) > STRAIGHT, [True]]) if len(track) > 1 else np.ones(0, bool)
-    ends = track[corner] if len(track) > 1 else track[:0]
-    return np.stack([ends[:-1], ends[1:]], axis=1)
+    corners = track[np.concatenate([[True], np.abs(_bends(track)) > STRAIGHT, [True]])] if len(track) else track
+    return np.stack([corners[:-1], corners[1:]], axis=1)
 
 
 STRAIGHT = 1e-6  # radians; a smaller change of direction is none

@@ -18,13 +18,13 @@ def test_figures_of_a_loop_by_hand():
     """One loop around two hypervertices: all but what the round swath misses in four corners."""
     figures = measure([LOOP], AREA, lay_grid(AREA, 10.0, 0.0, (0.0, 0.0)))
     corners = 4 * (25.0 - np.pi * 25.0 / 4)
-    assert figures.poc == pytest.approx(1 - corners / 800.0, abs=1e-4)
+    assert figures.poc == pytest.approx(1 - corners / 800.0, abs=3e-4)
     assert figures.cell_poc == pytest.approx(1.0)
     assert figures.turns == 4
     assert figures.length == pytest.approx(80.0)
     assert figures.turns_per_1000_m2 == pytest.approx(5.0)
     assert figures.length_per_1000_m2 == pytest.approx(100.0)
-    assert figures.overlap == pytest.approx(800.0 / (800.0 - corners) - 1, abs=1e-4)
+    assert figures.overlap == pytest.approx(800.0 / (800.0 - corners) - 1, abs=3e-4)
 
 
 def test_turns():
@@ -49,7 +49,7 @@ tracks = st.lists(st.tuples(st.integers(-20, 20), st.integers(-20, 20)), min_siz
 @settings(deadline=None, max_examples=60)
 @given(tracks, st.floats(0, 6.28), st.floats(0.5, 8))
 def test_swath_is_the_union_of_what_each_piece_sweeps(points, angle, spacing):
-    """Whatever the track's crossings and reversals, the swath is shapely's union on a precision grid; turning changes nothing."""
+    """Whatever the crossings and reversals, the swath is shapely's union on a precision grid, at any angle."""
     track = np.array(points, dtype=float)
     turned = track @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     capsules = shapely.buffer(shapely.linestrings(np.stack([turned[:-1], turned[1:]], axis=1)), spacing / 2, quad_segs=16)
