@@ -5,7 +5,7 @@ commands. So waiting, faults, triage and recovery have one door, and are the sam
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 from quarterdeck.mission.mission import Mission, Waypoint
@@ -71,6 +71,10 @@ def fixed(mission: Mission) -> Director:
     ) -> tuple[dict[str, Command], Any]:
         if memory is not None:
             return {}, memory
-        return {route.vehicle: Command(route.waypoints[1:]) for route in mission.routes}, True
+        return {
+            # A route's times are arrivals as planned; as a command's they would be departures to wait for.
+            route.vehicle: Command(tuple(replace(w, time=0.0) for w in route.waypoints[1:]))
+            for route in mission.routes
+        }, True
 
     return direct

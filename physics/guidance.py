@@ -1,0 +1,280 @@
+"""Guidance: from where a vehicle is and its path to what its controllers are to hold.
+
+Vessels: integral line of sight (Borhaug, Pavlov & Pettersen 2008; Fossen 2021, section 12.5) on the velocity over
+ground, the drift by current and wind taken off the course; turns begin at the wheel-over point. Ground: pure pursuit
+(Coulter 1992), corners turned on the spot. Aerial: a reference point that runs along the path within speed,
+acceleration and climb limits.
+"""
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from quarterdeck.physics.paths import HOLD, IDLE, ROTATE, SAIL
+
+ARRIVED = 1.0  # m: a vessel this near its waypoint has reached it
+CORNER = 0.3  # radians: a ground vehicle stops and turns on the spot at sharper corners
+CUT = 0.3  # m: how far inside a corner a multirotor may pass
+
+
+@njit(cache=True)
+def guide_vessels(
+    time: float,
+    step: float,
+    pose: np.ndarray,
+    velocity: np.ndarray,
+    rate: np.ndarray,
+    limits: np.ndarray,
+    tracks: np.ndarray,
+    table: np.ndarray,
+    heading: np.ndarray,
+    speed: np.ndarray,
+) -> None:
+    """Set `heading` (k,) radians and `speed` (k,) m/s through the water; tracks move on to their next legs.
+
+    `pose` (k, 3) x, y, heading and `velocity` (k, 2) over ground as known to the vehicles, (k, 2) ahead and to port
+    through the water in `velocity`'s columns 2 and 3; `rate` (k,) of turn; `step` is seconds since the last call.
+    """
+    for i in range(len(tracks)):
+        t, lim = tracks[i], limits[i]
+        x, y, psi = pose[i, 0], pose[i, 1], pose[i, 2]
+        _observe_drift(t, psi, velocity[i], rate[i], step)
+        ground = np.hypot(velocity[i, 0], velocity[i, 1])
+        if t.mode == HOLD and time >= t.until:
+            _depart(t)
+        if t.mode == SAIL:
+            _, _, length, along, _ = _leg(t, table, x, y)
+            remaining = length - along
+            stop = _stops(t, table, time)
+            if stop and (remaining <= ARRIVED):
+                _arrive(t, table, time)
+            elif not stop and remaining <= _wheel_over(t, table, lim, max(ground, 0.3), length):
+                t.leg += 1
+                t.integral = 0.0
+        if t.mode == SAIL:
+            tx, ty, length, along, cross = _leg(t, table, x, y)
+            remaining = length - along
+            wanted = min(table[t.leg].speed, t.slow)
+            if _stops(t, table, time):
+                wanted = min(wanted, max(np.sqrt(2 * 0.5 * lim.accel * max(remaining - ARRIVED / 2, 0.0)), 0.2))
+            ahead = max(2.5 * lim.length, 1.5 * lim.speed)
+            kappa = 0.05 * lim.speed
+            if abs(cross) < 2 * ahead and wanted > 0.1:
+                t.integral += step * ahead * cross / (ahead**2 + (cross + kappa * t.integral) ** 2)
+            course = np.arctan2(ty, tx) - np.arctan2(cross + kappa * t.integral, ahead) + t.bias
+            wx, wy = wanted * np.cos(course) - t.driftx, wanted * np.sin(course) - t.drifty
+            t.cross, t.turning = cross, along < lim.zone or remaining < lim.zone
+        else:
+            px, py = table[t.leg].x - x, table[t.leg].y - y
+            away = np.hypot(px, py)
+            gain = min(0.15, 0.5 / max(away, 1e-9))
+            wx, wy = gain * px - t.driftx, gain * py - t.drifty
+            t.cross, t.turning = 0.0, True
+            if away < ARRIVED and np.hypot(wx, wy) < 0.2:  # near enough in slack water: rest
+                heading[i], speed[i] = psi, 0.0
+                continue
+        heading[i] = np.arctan2(wy, wx)
+        speed[i] = min(np.hypot(wx, wy), lim.max_speed)
+
+
+@njit(cache=True)
+def guide_rovers(
+    time: float,
+    pose: np.ndarray,
+    velocity: np.ndarray,
+    limits: np.ndarray,
+    tracks: np.ndarray,
+    table: np.ndarray,
+    speed: np.ndarray,
+    turn: np.ndarray,
+) -> None:
+    """Set `speed` (k,) m/s and `turn` (k,) rad/s; `pose` (k, 3) x, y, heading, `velocity` (k,) m/s as known to the
+    vehicles.
+    """
+    for i in range(len(tracks)):
+        t, lim = tracks[i], limits[i]
+        x, y, psi = pose[i, 0], pose[i, 1], pose[i, 2]
+        if t.mode == HOLD and time >= t.until:
+            _depart(t)
+            if t.mode == SAIL:
+                t.mode = ROTATE
+        near = 0.03 + 0.02 * lim.speed
+        if t.mode == SAIL:
+            _, _, length, along, _ = _leg(t, table, x, y)
+            if _stops(t, table, time):
+                if length - along <= near:
+                    _arrive(t, table, time)
+            elif abs(_corner(t, table)) > CORNER:
+                if length - along <= near:
+                    t.leg += 1
+                    t.mode = ROTATE
+            elif length - along <= 0:
+                t.leg += 1
+        speed[i] = turn[i] = 0.0
+        if t.mode == HOLD or t.mode == IDLE:
+            t.cross, t.turning = 0.0, True
+            continue
+        tx, ty, length, along, cross = _leg(t, table, x, y)
+        t.cross, t.turning = cross, along < lim.zone or length - along < lim.zone
+        if t.mode == ROTATE:
+            error = _wrap(np.arctan2(ty, tx) - psi)
+            if abs(error) < 0.02 or length < near:
+                t.mode = SAIL
+            else:
+                turn[i] = min(max(3.0 * error, -lim.rate), lim.rate)
+                continue
+        wanted = min(table[t.leg].speed, t.slow)
+        if _stops(t, table, time) or abs(_corner(t, table)) > CORNER:
+            wanted = min(wanted, max(np.sqrt(2 * 0.7 * lim.accel * max(length - along - near, 0.0)), 0.05))
+        ahead = max(0.5 * lim.length, 0.8 * abs(velocity[i]))
+        bearing = _wrap(np.arctan2(ty * ahead - tx * cross, tx * ahead + ty * cross) - psi + t.bias)
+        if abs(bearing) > 1.0:  # pushed off its path: face it first
+            turn[i] = min(max(2.0 * bearing, -lim.rate), lim.rate)
+            continue
+        speed[i] = wanted
+        turn[i] = min(max(2 * wanted * np.sin(bearing) / ahead, -lim.rate), lim.rate)
+
+
+@njit(cache=True)
+def guide_multirotors(
+    time: float,
+    step: float,
+    position: np.ndarray,
+    limits: np.ndarray,
+    tracks: np.ndarray,
+    table: np.ndarray,
+    reference: np.ndarray,
+) -> None:
+    """Set `reference` (k, 7): position, velocity, heading; `position` (k, 3) as known to the vehicles. `reach` is
+    metres along the leg.
+    """
+    for i in range(len(tracks)):
+        t, lim = tracks[i], limits[i]
+        if t.mode == HOLD and time >= t.until:
+            _depart(t)
+            t.reach = t.pace = 0.0
+        a, b = table[max(t.leg - 1, t.first)], table[t.leg]
+        dx, dy, dz = b.x - a.x, b.y - a.y, b.z - a.z
+        length = np.sqrt(dx * dx + dy * dy + dz * dz)
+        if t.mode == SAIL:
+            # How far the vehicle trails its reference holds the reference back.
+            gap = np.sqrt((reference[i, 0] - position[i, 0]) ** 2 + (reference[i, 1] - position[i, 1]) ** 2
+                          + (reference[i, 2] - position[i, 2]) ** 2)  # fmt: skip
+            wanted = min(b.speed, t.slow) * min(max(2.0 - gap / 2.0, 0.0), 1.0)
+            if length > 0 and abs(dz) / length * wanted > lim.climb:
+                wanted = lim.climb * length / abs(dz)
+            leave = 0.0 if _stops(t, table, time) else _corner_speed(t, table, lim.accel)
+            wanted = min(wanted, np.sqrt(leave**2 + 2 * 0.7 * lim.accel * max(length - t.reach, 0.0)))
+            t.pace = min(max(wanted, t.pace - lim.accel * step), t.pace + 0.7 * lim.accel * step)
+            t.reach += max(t.pace, 0.05) * step
+            if t.reach >= length:
+                if _stops(t, table, time):
+                    t.reach, t.pace = length, 0.0
+                    if gap < 0.5:
+                        _arrive(t, table, time)
+                else:
+                    t.reach -= length
+                    t.leg += 1
+                    a, b = table[t.leg - 1], table[t.leg]
+                    dx, dy, dz = b.x - a.x, b.y - a.y, b.z - a.z
+                    length = np.sqrt(dx * dx + dy * dy + dz * dz)
+        if t.mode == SAIL and length > 0:
+            s, v = min(t.reach, length) / length, t.pace / length
+            reference[i, 0], reference[i, 1], reference[i, 2] = a.x + s * dx, a.y + s * dy, a.z + s * dz
+            reference[i, 3], reference[i, 4], reference[i, 5] = v * dx, v * dy, v * dz
+            if np.hypot(dx, dy) > 0.1:
+                reference[i, 6] = np.arctan2(dy, dx)
+            px, py, pz = position[i, 0] - a.x, position[i, 1] - a.y, position[i, 2] - a.z
+            along = (px * dx + py * dy + pz * dz) / length
+            t.cross = np.sqrt(max(px * px + py * py + pz * pz - along * along, 0.0))
+            t.turning = along < lim.zone or length - along < lim.zone
+        else:
+            reference[i, 0], reference[i, 1], reference[i, 2] = b.x, b.y, b.z
+            reference[i, 3] = reference[i, 4] = reference[i, 5] = 0.0
+            t.cross, t.turning = 0.0, True
+
+
+@njit(cache=True)
+def _observe_drift(t: Any, psi: float, velocity: np.ndarray, rate: float, step: float) -> None:
+    """Track what the water and the wind add to the course steered; in turns the hull slips, so it is left as it was."""
+    if abs(rate) > 0.08:
+        return
+    cos, sin = np.cos(psi), np.sin(psi)
+    gain = step / 5.0
+    t.driftx += gain * (velocity[0] - cos * velocity[2] - t.driftx)
+    t.drifty += gain * (velocity[1] - sin * velocity[2] - t.drifty)
+
+
+@njit(cache=True)
+def _leg(t: Any, table: np.ndarray, x: float, y: float) -> tuple[float, float, float, float, float]:
+    """Return the leg's direction (2), length, and the position's distance along it and to port of it."""
+    a, b = table[max(t.leg - 1, t.first)], table[t.leg]
+    dx, dy = b.x - a.x, b.y - a.y
+    length = np.hypot(dx, dy)
+    if length < 1e-9:
+        return 1.0, 0.0, 0.0, 0.0, 0.0
+    tx, ty = dx / length, dy / length
+    return tx, ty, length, tx * (x - a.x) + ty * (y - a.y), tx * (y - a.y) - ty * (x - a.x)
+
+
+@njit(cache=True)
+def _wrap(angle: float) -> float:
+    return (angle + np.pi) % (2 * np.pi) - np.pi
+
+
+@njit(cache=True)
+def _corner(t: Any, table: np.ndarray) -> float:
+    """Return the signed turn at the end of the leg, radians."""
+    a, b, c = table[max(t.leg - 1, t.first)], table[t.leg], table[min(t.leg + 1, t.last)]
+    if (b.x == a.x and b.y == a.y) or (b.x == c.x and b.y == c.y):
+        return 0.0
+    return _wrap(np.arctan2(c.y - b.y, c.x - b.x) - np.arctan2(b.y - a.y, b.x - a.x))
+
+
+@njit(cache=True)
+def _stops(t: Any, table: np.ndarray, time: float) -> bool:
+    """Whether the vehicle comes to a stop at the end of the leg: to hold, to wait, or for good."""
+    return t.leg >= t.last or table[t.leg].hold > 0 or table[min(t.leg + 1, t.last)].depart > time
+
+
+@njit(cache=True)
+def _arrive(t: Any, table: np.ndarray, time: float) -> None:
+    t.integral = 0.0
+    t.until = time + table[t.leg].hold
+    if t.leg < t.last:
+        t.until = max(t.until, table[t.leg + 1].depart)
+    t.mode = HOLD
+
+
+@njit(cache=True)
+def _depart(t: Any) -> None:
+    if t.leg < t.last:
+        t.leg += 1
+        t.mode = SAIL
+    else:
+        t.mode = IDLE
+
+
+@njit(cache=True)
+def _wheel_over(t: Any, table: np.ndarray, lim: Any, ground: float, length: float) -> float:
+    """Return how far before the waypoint the turn begins: that of a circle touching both legs, and the time to swing."""
+    half = abs(_corner(t, table)) / 2
+    radius = max(ground / lim.rate, lim.radius * ground / lim.speed)
+    turn = radius * min(np.tan(min(half, 1.5)), 2.0) + 0.5 * ground * min(2 * half, 1.0)
+    b, c = table[t.leg], table[t.leg + 1]
+    return min(turn, 0.5 * length, 0.5 * np.hypot(c.x - b.x, c.y - b.y))
+
+
+@njit(cache=True)
+def _corner_speed(t: Any, table: np.ndarray, accel: float) -> float:
+    """Return the speed at which the corner can be rounded within CUT metres of it at the acceleration limit."""
+    a, b, c = table[max(t.leg - 1, t.first)], table[t.leg], table[min(t.leg + 1, t.last)]
+    px, py, pz, qx, qy, qz = b.x - a.x, b.y - a.y, b.z - a.z, c.x - b.x, c.y - b.y, c.z - b.z
+    size = np.sqrt((px * px + py * py + pz * pz) * (qx * qx + qy * qy + qz * qz))
+    if size < 1e-12:
+        return 0.0
+    half = np.arccos(min(max((px * qx + py * qy + pz * qz) / size, -1.0), 1.0)) / 2
+    if half > 1.3:  # about back: stop
+        return 0.0
+    return np.sqrt(accel * CUT / max(1 / np.cos(half) - 1, 1e-6))

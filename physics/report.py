@@ -1,0 +1,293 @@
+"""The verdict: what a run comes to, beside what was planned and what is allowed."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from difflib import get_close_matches
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from quarterdeck import __version__
+from quarterdeck.geo.errors import InputError
+from quarterdeck.mission.mission import Mission, Route
+from quarterdeck.physics.swath import covered_fraction, driven_tracks, planned_tracks
+from quarterdeck.physics.swept import Swept, closest_approaches, sweep
+from quarterdeck.physics.trace import Trace
+
+# What a run may come to and still pass; None for `cross_track` is half of each vehicle's clearance.
+LIMITS: dict[str, tuple[float | None, str]] = {
+    "coverage_loss": (0.01, "covered by the plan and not by the driven tracks, as a fraction of the area"),
+    "collisions": (0, "vehicles that touched or went through anything"),
+    "unfinished": (0, "vehicles that did not finish their routes"),
+    "unserved": (0, "tasks of the plan not served"),
+    "cross_track": (None, "95 % of cross-track errors on straight legs, m (default: half the vehicle's clearance)"),
+    "clearance": (0.0, "least distance of a hull to an obstacle, m"),
+    "separation": (0.0, "least distance between the hulls of two vehicles, m"),
+    "battery": (1.0, "energy used over the battery's"),
+    "endurance": (1.0, "time under way over the endurance"),
+    "delay": (1.5, "time driven over time planned"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class CrossTrack:
+    """Absolute cross-track errors in metres over `samples` samples (0: none, figures 0)."""
+
+    mean: float
+    p95: float
+    max: float
+    samples: int
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleReport:
+    """One vehicle's run. Times s, energies Wh, distances m; `touched` counts separate contacts that PyBullet told of,
+    `hits` names the obstacles that the hull went through by the swept-path check; None where there is nothing to be
+    near to.
+    """
+
+    id: str
+    domain: str
+    finished: bool
+    aground: bool
+    legs: CrossTrack
+    turns: CrossTrack
+    touched: int
+    hits: tuple[str, ...]
+    clearance: float | None
+    clearance_time: float
+    clearance_obstacle: str
+    separation: float | None
+    separation_time: float
+    separation_vehicle: str
+    time_planned: float
+    time: float
+    energy_planned: float
+    energy: float
+    length_planned: float
+    length: float
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A run's figures, the limits that they were held against, and why it failed (`reasons`; it passed when there are
+    none).
+    """
+
+    mission: str
+    version: str
+    settings: Mapping[str, Any]
+    limits: Mapping[str, float | None]
+    figures: Mapping[str, float | int | None]
+    vehicles: tuple[VehicleReport, ...]
+    reasons: tuple[str, ...]
+    trace_hash: str
+
+    @property
+    def passed(self) -> bool:
+        """Whether everything is within the limits."""
+        return not self.reasons
+
+    def to_json(self) -> str:
+        """Return the report as JSON, by the schema that `report_schema` returns."""
+        document = {"type": "quarterdeck-report", "passed": self.passed, **asdict(self)}
+        return json.dumps(document, indent=2, allow_nan=False) + "\n"
+
+
+@cache
+def report_schema() -> dict[str, Any]:
+    """Return the JSON Schema (2020-12) of a report."""
+    text = (files("quarterdeck.physics") / "report.schema.json").read_text(encoding="utf-8")
+    schema: dict[str, Any] = json.loads(text)
+    return schema
+
+
+def check_limits(limits: Mapping[str, float]) -> dict[str, float | None]:
+    """Return all LIMITS with `limits` in their place. Raises InputError for an unknown one or a value that is not a
+    number.
+    """
+    for name, value in limits.items():
+        if name not in LIMITS:
+            near = get_close_matches(name, LIMITS, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(LIMITS)}"
+            raise InputError(f"unknown limit {name!r}; {hint}")
+        if not value >= 0:
+            raise InputError(f"limit {name} = {value} must be a number from 0")
+    return {name: default for name, (default, _) in LIMITS.items()} | dict(limits)
+
+
+def measure(
+    mission: Mission,
+    trace: Trace,
+    *,
+    finished: Sequence[bool],
+    aground: Sequence[bool],
+    served: Mapping[str, float],
+    limits: Mapping[str, float],
+    settings: Mapping[str, Any],
+) -> Report:
+    """Measure a trace against the mission and judge it.
+
+    `finished` and `aground` are (k,), `served` the times at which tasks were. Raises InputError for an unknown limit.
+    """
+    allowed = check_limits(limits)
+    size = np.array([np.hypot(v.model.length, v.model.width) for v in mission.vehicles])
+    thin = max(1, round(0.5 / max(float(np.diff(trace.time[:2]).sum()), 1e-9))) if len(trace.time) > 1 else 1
+    near = closest_approaches(trace.x[::thin], trace.y[::thin], trace.z[::thin], trace.underway[::thin], size)
+    routes = {route.vehicle: route for route in mission.routes}
+    vehicles = tuple(
+        _vehicle(mission, trace, i, bool(finished[i]), bool(aground[i]), routes, near, thin)
+        for i in range(len(trace.vehicles))
+    )
+    figures = _figures(mission, trace, vehicles, served)
+    reasons = _reasons(mission, vehicles, figures, allowed)
+    return Report(mission.name, __version__, settings, allowed, figures, vehicles, tuple(reasons), trace.hash)
+
+
+def _vehicle(
+    mission: Mission,
+    trace: Trace,
+    i: int,
+    finished: bool,
+    aground: bool,
+    routes: Mapping[str, Route],
+    near: tuple[np.ndarray, np.ndarray, np.ndarray],
+    thin: int,
+) -> VehicleReport:
+    vehicle = mission.vehicles[i]
+    route = routes.get(vehicle.id, Route(vehicle.id, ()))
+    moving = trace.kind[:, i] > 0
+    cross = np.abs(trace.cross[:, i].astype(float))
+    swept: Swept = sweep(mission.site, vehicle, trace, i)
+    contact = trace.contact[:, i]
+    track = np.column_stack([trace.x[:, i], trace.y[:, i], trace.z[:, i]])
+    moved = np.linalg.norm(np.diff(track, axis=0), axis=1)
+    last = np.flatnonzero(moved > 0)
+    separation, other, when = near[0][i], near[1][i], near[2][i]
+    return VehicleReport(
+        id=vehicle.id,
+        domain=vehicle.domain,
+        finished=finished,
+        aground=aground,
+        legs=_cross_track(cross[moving & ~trace.turning[:, i]]),
+        turns=_cross_track(cross[moving & trace.turning[:, i] & (cross > 0)]),
+        touched=int(np.count_nonzero(contact & ~np.r_[False, contact[:-1]])),
+        hits=swept.hits,
+        clearance=float(swept.clearance) if np.isfinite(swept.clearance) else None,
+        clearance_time=swept.time,
+        clearance_obstacle=swept.obstacle,
+        separation=float(separation) if np.isfinite(separation) else None,
+        separation_time=float(trace.time[when * thin]) if other >= 0 else 0.0,
+        separation_vehicle=trace.vehicles[other] if other >= 0 else "",
+        time_planned=route.duration,
+        time=float(trace.time[last[-1] + 1]) if len(last) else 0.0,
+        energy_planned=route.energy,
+        energy=float(trace.energy[-1, i]),
+        length_planned=route.length,
+        length=float(moved.sum()),
+    )
+
+
+def _cross_track(errors: np.ndarray) -> CrossTrack:
+    if not len(errors):
+        return CrossTrack(0.0, 0.0, 0.0, 0)
+    return CrossTrack(float(errors.mean()), float(np.percentile(errors, 95)), float(errors.max()), len(errors))
+
+
+def _figures(
+    mission: Mission, trace: Trace, vehicles: Sequence[VehicleReport], served: Mapping[str, float]
+) -> dict[str, float | int | None]:
+    """The fleet's figures. Coverage is what lies within half the spacing of survey legs, planned and driven by one
+    measure.
+    """
+    planned = driven = None
+    if mission.spacing is not None and any(route.survey.any() for route in mission.routes):
+        planned = covered_fraction(mission.site, planned_tracks(mission.routes), mission.spacing)
+        driven = covered_fraction(mission.site, driven_tracks(trace), mission.spacing)
+    moving, sharp = trace.kind > 0, trace.turning
+    cross = np.abs(trace.cross.astype(float))
+    legs, turns = _cross_track(cross[moving & ~sharp]), _cross_track(cross[moving & sharp & (cross > 0)])
+    tasks = {w.task for route in mission.routes for w in route.waypoints if w.task is not None}
+    clear = [v.clearance for v in vehicles if v.clearance is not None]
+    apart = [v.separation for v in vehicles if v.separation is not None]
+    return {
+        "coverage_planned": planned,
+        "coverage_driven": driven,
+        "tasks_planned": len(tasks),
+        "tasks_served": len(tasks & set(served)),
+        "finished": sum(v.finished for v in vehicles),
+        "collisions": sum(v.touched > 0 or bool(v.hits) for v in vehicles),
+        "clearance": min(clear, default=None),
+        "separation": min(apart, default=None),
+        "legs_mean": legs.mean,
+        "legs_p95": legs.p95,
+        "legs_max": legs.max,
+        "turns_mean": turns.mean,
+        "turns_p95": turns.p95,
+        "turns_max": turns.max,
+        "time_planned": max((v.time_planned for v in vehicles), default=0.0),
+        "time": max((v.time for v in vehicles), default=0.0),
+        "energy_planned": sum(v.energy_planned for v in vehicles),
+        "energy": sum(v.energy for v in vehicles),
+        "length_planned": sum(v.length_planned for v in vehicles),
+        "length": sum(v.length for v in vehicles),
+    }
+
+
+def _reasons(
+    mission: Mission, vehicles: Sequence[VehicleReport], figures: Mapping[str, Any], allowed: Mapping[str, float | None]
+) -> list[str]:
+    reasons: list[str] = []
+
+    def over(name: str, value: float, text: str) -> None:
+        limit = allowed[name]
+        if limit is not None and value > limit + 1e-12:
+            reasons.append(text)
+
+    if figures["coverage_planned"] is not None:
+        loss = figures["coverage_planned"] - figures["coverage_driven"]
+        over(
+            "coverage_loss",
+            loss,
+            f"coverage {figures['coverage_driven']:.2%} driven of {figures['coverage_planned']:.2%} planned",
+        )
+    touched = [v.id for v in vehicles if v.touched or v.hits]
+    over("collisions", len(touched), f"collision: {_list(touched)}")
+    late = [v.id for v in vehicles if not v.finished]
+    over("unfinished", len(late), f"did not finish: {_list(late)}")
+    unserved = figures["tasks_planned"] - figures["tasks_served"]
+    over("unserved", unserved, f"{unserved} of {figures['tasks_planned']} tasks not served")
+    for vehicle, v in zip(mission.vehicles, vehicles, strict=True):
+        track = allowed["cross_track"]
+        track = vehicle.clearance / 2 if track is None else track
+        if v.legs.p95 > track > 0 or (track == 0 and allowed["cross_track"] == 0 and v.legs.p95 > 0):
+            reasons.append(
+                f"{v.id}: 95 % of cross-track errors on straight legs up to {v.legs.p95:.2f} m, allowed {track:.2f} m"
+            )
+        if v.clearance is not None and v.clearance < (allowed["clearance"] or 0.0):
+            reasons.append(
+                f"{v.id}: {v.clearance:.2f} m from obstacle {v.clearance_obstacle!r} at {v.clearance_time:.0f} s"
+            )
+        if v.separation is not None and v.separation < (allowed["separation"] or 0.0):
+            reasons.append(f"{v.id}: {v.separation:.2f} m from {v.separation_vehicle} at {v.separation_time:.0f} s")
+        over(
+            "battery",
+            v.energy / vehicle.battery,
+            f"{v.id}: used {v.energy:.0f} Wh of a battery of {vehicle.battery:.0f} Wh",
+        )
+        over(
+            "endurance",
+            v.time / vehicle.endurance,
+            f"{v.id}: {v.time:.0f} s under way, endurance {vehicle.endurance:.0f} s",
+        )
+    if figures["time_planned"] > 0:
+        ratio = figures["time"] / figures["time_planned"]
+        over("delay", ratio, f"took {figures['time']:.0f} s, planned {figures['time_planned']:.0f} s")
+    return reasons
+
+
+def _list(ids: Sequence[str]) -> str:
+    return ", ".join(ids[:5]) + (f" and {len(ids) - 5} more" if len(ids) > 5 else "")
