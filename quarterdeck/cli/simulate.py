@@ -1,0 +1,183 @@
+"""`quarterdeck simulate`: execute a plan in PyBullet and judge it."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from quarterdeck.cli.output import console, emit, force_option, minutes, seed_option
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from quarterdeck.mission.mission import Mission
+    from quarterdeck.physics.report import Report
+
+
+class Vector(click.ParamType):
+    """Two numbers with a comma: metres per second to the east and to the north."""
+
+    name = "E,N"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
+        """Return (east, north)."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            east, north = (float(part) for part in value.split(","))
+        except ValueError:
+            self.fail(f"{value!r} is not two numbers with a comma, such as 0.3,-0.1", param, ctx)
+        return east, north
+
+
+class Limit(click.ParamType):
+    """NAME=VALUE."""
+
+    name = "NAME=VALUE"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, float]:
+        """Return (name, value)."""
+        if isinstance(value, tuple):
+            return value
+        name, _, number = value.partition("=")
+        try:
+            return name.strip(), float(number)
+        except ValueError:
+            self.fail(f"{value!r} is not NAME=VALUE, such as cross_track=1.5", param, ctx)
+
+
+@click.command(short_help="Execute a plan in PyBullet; report and verdict.")
+@click.argument("plan")
+@click.option("--report", metavar="FILE", help="Write the report as JSON.")
+@click.option("--current", type=Vector(), default="0,0", show_default=True, help="Water's motion, m/s east and north.")
+@click.option("--wind", type=Vector(), default="0,0", show_default=True, help="Mean wind, m/s towards east and north.")
+@click.option(
+    "--gusts", type=click.FloatRange(min=0), default=0.0, show_default=True, help="Standard deviation of gusts, m/s."
+)
+@seed_option
+@click.option(
+    "--limit", "limits", type=Limit(), multiple=True, help="A limit of the verdict; repeatable. See docs/simulation.md."
+)
+@click.option(
+    "--step", type=click.FloatRange(0.001, 0.1), default=0.1, show_default=True, help="Seconds a step of the world."
+)
+@click.option("--json", "as_json", is_flag=True, help="Write the report as JSON to standard output.")
+@force_option
+def command(
+    plan: str,
+    report: str | None,
+    current: tuple[float, float],
+    wind: tuple[float, float],
+    gusts: float,
+    seed: int,
+    limits: tuple[tuple[str, float], ...],
+    step: float,
+    as_json: bool,
+    force: bool,
+) -> int:
+    """Execute PLAN (a file, or - for standard input) with the vehicles' real dynamics, and tell whether it holds.
+
+    Exit status 1 if the verdict fails.
+    """
+    from quarterdeck.geo.errors import InputError
+    from quarterdeck.mission.planfile import read_plan
+    from quarterdeck.physics.simulate import simulate
+
+    for name in (report,):  # told before the run, not after it
+        if name and name != "-" and Path(name).exists() and not force:
+            raise InputError(f"{name} exists; give --force to overwrite it, or another name")
+    mission = read_plan(plan)
+    with _progress(mission.name) as progress:
+        run = simulate(
+            mission,
+            seed=seed,
+            step=step,
+            current=current,
+            wind=wind,
+            gusts=gusts,
+            limits=dict(limits),
+            progress=progress,
+        )
+    if report:
+        emit(run.report.to_json(), report, force=force)
+    if as_json:
+        emit(run.report.to_json(), "-", force=force)
+    print_report(mission, run.report)
+    return 0 if run.report.passed else 1
+
+
+@contextmanager
+def _progress(title: str) -> Iterator[Callable[[float, float], None]]:
+    """Show a bar on standard error, where that is a terminal: simulated time, how many times real time, time left."""
+    from time import monotonic
+
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    screen = console()
+    columns = [TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[clock]}"), TimeRemainingColumn()]
+    began = shown = monotonic()
+    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
+        task = bar.add_task(title, clock="")
+
+        def tell(done: float, expected: float) -> None:
+            nonlocal shown
+            now = monotonic()
+            if now - shown > 0.1:
+                shown = now
+                clock = f"{minutes(done)} at {done / (now - began):.0f}x"
+                bar.update(task, completed=done, total=max(expected, done), clock=clock)
+
+        yield tell
+
+
+def print_report(mission: Mission, report: Report) -> None:
+    """Print the verdict and its figures on standard error."""
+    from rich.table import Table
+
+    screen = console()
+    table = Table(title=f"{mission.name}: simulated", title_justify="left")
+    for column in (
+        "vehicle",
+        "time",
+        "planned",
+        "energy",
+        "planned",
+        "off legs 95 %",
+        "max",
+        "nearest obstacle",
+        "vehicle",
+    ):
+        table.add_column(column, justify="left" if column == "vehicle" and not table.columns else "right")
+    for v in report.vehicles[:60]:
+        table.add_row(
+            v.id,
+            minutes(v.time),
+            minutes(v.time_planned),
+            f"{v.energy:.1f} Wh",
+            f"{v.energy_planned:.1f} Wh",
+            f"{v.legs.p95:.2f} m",
+            f"{v.legs.max:.2f} m",
+            "hit" if v.hits else _metres(v.clearance),
+            _metres(v.separation),
+        )
+    screen.print(table)
+    figures = report.figures
+    words = []
+    if figures["coverage_planned"] is not None:
+        words.append(f"coverage {figures['coverage_driven']:.2%} driven of {figures['coverage_planned']:.2%} planned")
+    if figures["tasks_planned"]:
+        words.append(f"tasks {figures['tasks_served']} of {figures['tasks_planned']} served")
+    words.append(f"collisions {figures['collisions']}")
+    words.append(f"finished {figures['finished']} of {len(report.vehicles)}")
+    screen.print("; ".join(words))
+    for reason in report.reasons:
+        screen.print(f"[bold]failed:[/] {reason}", soft_wrap=True)
+    if report.passed:
+        screen.print("[bold]passed[/]")
+
+
+def _metres(distance: float | None) -> str:
+    return "" if distance is None else f"{distance:.1f} m"
