@@ -1,0 +1,364 @@
+"""Balancing regions: cells flow from regions with a surplus to those with a deficit until each has its target.
+
+The flow between neighbouring regions solves the Laplace equation of the regions' graph (diffusive load balancing, Hu
+& Blake 1999); it is carried out by cells on the borders whose leaving keeps their region 4-connected. Where none may
+go, a cell goes with all that hangs on it; borders that stay stuck are barred for a while, so that the flow takes
+another way. The last units travel along chains of regions.
+"""
+
+import numba
+import numpy as np
+
+from quarterdeck.coverage.cuts import SIMPLE, hanging, is_simple, move_hanging
+
+ROUNDS = 400
+PATIENCE = 40
+
+
+def balance(labels: np.ndarray, starts: np.ndarray, targets: np.ndarray, width: int, lane: int, seed: int) -> np.ndarray:
+    """Return the labels of the best balance found; regions stay 4-connected and keep their starts.
+
+    `labels` is (n,) int32, padded and flattened rows of length `width`; `starts` (k,) are cells, `targets` (k,) their
+    numbers. `lane` is the step along which whole runs of cells change hands: 1 rows, `width` columns, 0 no preference.
+    Ends after ROUNDS rounds, or PATIENCE rounds without progress.
+    """
+    k = len(starts)
+    rng = np.random.default_rng(seed)
+    is_start = np.zeros(len(labels), dtype=np.bool_)
+    is_start[starts] = True
+    labels = labels.copy()
+    best, best_cost = labels.copy(), _cost(labels, targets)
+    barred = np.zeros((k, k), dtype=np.int32)
+    penalty = np.ones((k, k), dtype=np.int32)
+    stale = 0
+    for round_ in range(ROUNDS):
+        if best_cost[1] == 0 or stale > PATIENCE:
+            break
+        sizes, border = _census(labels, k, width)
+        surplus = sizes - targets
+        if np.abs(surplus).max() > 2:
+            want = _flow(surplus, np.where(barred > round_, 0, border), targets)
+            moved = _transfer(labels, is_start, want, width, lane, SIMPLE)
+            rest = want - moved
+            if 4 * rest.sum() > want.sum():
+                moved += _transfer_by_depth(labels, starts, is_start, rest, width)
+            stuck = (want > 0) & (moved * 4 < want)
+            if 2 * moved.sum() < want.sum():
+                _move_blocks(labels, starts, targets, width, rng, 1.0)
+        else:
+            stuck = np.zeros((k, k), dtype=np.bool_)
+            if not _chains(labels, starts, targets, width, rng):
+                _move_blocks(labels, starts, targets, width, rng, 1.3)
+        stuck = stuck | stuck.T
+        barred[stuck] = round_ + penalty[stuck]
+        penalty[stuck] = np.minimum(penalty[stuck] * 2, 64)
+        cost = _cost(labels, targets)
+        if cost < best_cost:
+            best, best_cost, stale = labels.copy(), cost, 0
+        else:
+            stale += 1
+    return best
+
+
+def _cost(labels: np.ndarray, targets: np.ndarray) -> tuple[float, float]:
+    """Return the largest excess over a target, in cells but at least 1, and the sum of squares of all differences."""
+    difference = np.bincount(labels[labels >= 0], minlength=len(targets)) - targets
+    return max(float(np.abs(difference).max()), 1.0), float((difference**2).sum())
+
+
+@numba.njit(cache=True)
+def _census(labels: np.ndarray, k: int, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the regions' sizes (k,) and the lengths of their borders (k, k)."""
+    sizes = np.zeros(k, dtype=np.int64)
+    border = np.zeros((k, k), dtype=np.int64)
+    for cell in range(width, len(labels) - width):
+        i = labels[cell]
+        if i >= 0:
+            sizes[i] += 1
+            for there in (cell + 1, cell + width):
+                j = labels[there]
+                if j >= 0 and j != i:
+                    border[i, j] += 1
+                    border[j, i] += 1
+    return sizes, border
+
+
+def _flow(surplus: np.ndarray, border: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    """Return (k, k) whole cells that each region should give to each neighbour, so that all surplus evens out.
+
+    Where barred borders part the graph, each part shares its surplus in proportion to the targets.
+    """
+    conductance = np.sqrt(border)
+    laplacian = np.diag(conductance.sum(axis=0)) - conductance
+    potential = np.linalg.solve(laplacian + 1e-7 * np.diag(np.maximum(targets, 1) / targets.mean()), surplus)
+    flow = conductance * (potential[:, None] - potential[None, :])
+    return np.maximum(np.floor(flow + 0.5), 0).astype(np.int64)
+
+
+@numba.njit(cache=True)
+def _transfer(labels, is_start, want, width, lane, table):  # type: ignore[no-untyped-def]
+    """Move border cells from region to region as `want` (k, k) asks, and return how many moved (k, k).
+
+    Fronts advance cell by cell, all borders in turn; along a `lane` a front runs as far as it can before it steps aside.
+    """
+    n = len(labels)
+    moved = np.zeros_like(want)
+    left = want.copy()
+    queue = np.empty(4 * n, dtype=np.int32)
+    target = np.empty(4 * n, dtype=np.int32)
+    last = 0
+    for first_pass in (True, False):
+        for cell in range(width, n - width):
+            i = labels[cell]
+            if i < 0 or is_start[cell]:
+                continue
+            for step in (
+                lane if lane else 1,
+                -lane if lane else -1,
+                width if lane != width else 1,
+                -width if lane != width else -1,
+            ):
+                j = labels[cell + step]
+                if j >= 0 and j != i and left[i, j] > 0 and (abs(step) == lane) == first_pass:
+                    queue[last], target[last] = cell, j
+                    last += 1
+    stack = np.empty(n, dtype=np.int32)
+    first = 0
+    while first < last:
+        j = target[first]
+        stack[0] = queue[first]
+        first += 1
+        top = 1
+        i = labels[stack[0]]
+        while top > 0:
+            top -= 1
+            cell = stack[top]
+            if (
+                labels[cell] != i
+                or i == j
+                or left[i, j] <= 0
+                or is_start[cell]
+                or not is_simple(labels, cell, width, table)
+            ):
+                continue
+            if labels[cell - 1] != j and labels[cell + 1] != j and labels[cell - width] != j and labels[cell + width] != j:
+                continue
+            labels[cell] = j
+            left[i, j] -= 1
+            moved[i, j] += 1
+            for step in (-1, 1, -width, width):
+                there = cell + step
+                if labels[there] == i and not is_start[there]:
+                    if abs(step) == lane:
+                        if top < n:
+                            stack[top] = there
+                            top += 1
+                    elif last < 4 * n:
+                        queue[last], target[last] = there, j
+                        last += 1
+    return moved
+
+
+@numba.njit(cache=True)
+def _transfer_by_depth(labels, starts, is_start, want, width):  # type: ignore[no-untyped-def]
+    """Move border cells as `_transfer` does where the neighbours alone cannot tell; return how many moved (k, k).
+
+    Every cell but a start keeps a neighbour of its region that is nearer to the start, so regions stay 4-connected; a cell
+    may leave when each farther neighbour has another nearer one.
+    """
+    n = len(labels)
+    depth = _depths(labels, starts, width)
+    moved = np.zeros_like(want)
+    left = want.copy()
+    queue = np.empty(4 * n, dtype=np.int32)
+    target = np.empty(4 * n, dtype=np.int32)
+    last = 0
+    for cell in range(width, n - width):
+        i = labels[cell]
+        if i >= 0 and not is_start[cell]:
+            for step in (-1, 1, -width, width):
+                j = labels[cell + step]
+                if j >= 0 and j != i and left[i, j] > 0:
+                    queue[last], target[last] = cell, j
+                    last += 1
+    first = 0
+    while first < last:
+        cell, j = queue[first], target[first]
+        first += 1
+        i = labels[cell]
+        if i == j or left[i, j] <= 0 or not _may_leave(labels, depth, cell, width):
+            continue
+        nearest = 2**30
+        for step in (-1, 1, -width, width):
+            if labels[cell + step] == j:
+                nearest = min(nearest, depth[cell + step])
+        if nearest == 2**30:
+            continue
+        labels[cell] = j
+        depth[cell] = nearest + 1
+        left[i, j] -= 1
+        moved[i, j] += 1
+        for step in (-1, 1, -width, width):
+            there = cell + step
+            if labels[there] == i and not is_start[there] and last < 4 * n:
+                queue[last], target[last] = there, j
+                last += 1
+    return moved
+
+
+@numba.njit(cache=True)
+def _may_leave(labels: np.ndarray, depth: np.ndarray, cell: int, width: int) -> bool:
+    own = labels[cell]
+    for step in (-1, 1, -width, width):
+        child = cell + step
+        if labels[child] == own and depth[child] > depth[cell]:
+            other = False
+            for turn in (-1, 1, -width, width):
+                parent = child + turn
+                if parent != cell and labels[parent] == own and depth[parent] < depth[child]:
+                    other = True
+            if not other:
+                return False
+    return True
+
+
+@numba.njit(cache=True)
+def _depths(labels: np.ndarray, starts: np.ndarray, width: int) -> np.ndarray:
+    """Return how many steps within its region each cell is from the start (breadth first)."""
+    depth = np.full(len(labels), -1, dtype=np.int32)
+    queue = np.empty(len(labels), dtype=np.int32)
+    last = 0
+    for start in starts:
+        depth[start] = 0
+        queue[last] = start
+        last += 1
+    first = 0
+    while first < last:
+        cell = queue[first]
+        first += 1
+        for step in (-1, 1, -width, width):
+            there = cell + step
+            if labels[there] == labels[cell] and depth[there] < 0:
+                depth[there] = depth[cell] + 1
+                queue[last] = there
+                last += 1
+    return depth
+
+
+@numba.njit(cache=True)
+def _move_blocks(labels, starts, targets, width, rng, daring):  # type: ignore[no-untyped-def]
+    """Give cells with all that hangs on them to a neighbour where that lessens the sum of squared differences.
+
+    Each region takes part in one move, so that the search's results stay true; the largest gains go first. With `daring`
+    above 1 a move may overshoot by that factor. Returns the number of moves.
+    """
+    k = len(starts)
+    number, order, size, low, parent, weight = hanging(labels, starts, width)
+    surplus = -targets.copy()
+    for label in labels:
+        if label >= 0:
+            surplus[label] += 1
+    best_gain = np.zeros((k, k))
+    best_cell = np.full((k, k), -1, dtype=np.int32)
+    for cell in range(width, len(labels) - width):
+        i = labels[cell]
+        if i < 0 or weight[cell] == 0:
+            continue
+        w = weight[cell]
+        for step in (-1, 1, -width, width):
+            j = labels[cell + step]
+            if j >= 0 and j != i:
+                gain = w * (daring * (surplus[i] - surplus[j]) - w) * (0.9 + 0.1 * rng.random())
+                if gain > best_gain[i, j]:
+                    best_gain[i, j] = gain
+                    best_cell[i, j] = cell
+    free = np.ones(k, dtype=np.bool_)
+    moves = 0
+    for at in np.argsort(-best_gain.ravel()):
+        i, j = at // k, at % k
+        if best_gain[i, j] <= 0:
+            break
+        if free[i] and free[j]:
+            free[i] = free[j] = False
+            move_hanging(labels, best_cell[i, j], j, width, number, order, size, low, parent)
+            moves += 1
+    return moves
+
+
+@numba.njit(cache=True)
+def _chains(labels, starts, targets, width, rng):  # type: ignore[no-untyped-def]
+    """Send single cells along shortest chains of regions from a surplus to a deficit at least two lower.
+
+    Chains of one call share no region. Returns the number of cells moved.
+    """
+    k = len(starts)
+    _, _, _, _, _, weight = hanging(labels, starts, width)
+    surplus = -targets.copy()
+    movable = np.zeros((k, k), dtype=np.int32)
+    for cell in range(width, len(labels) - width):
+        i = labels[cell]
+        if i < 0:
+            continue
+        surplus[i] += 1
+        if weight[cell] == 1:
+            for step in (-1, 1, -width, width):
+                j = labels[cell + step]
+                if j >= 0 and j != i:
+                    movable[i, j] += 1
+    free = np.ones(k, dtype=np.bool_)
+    moves = 0
+    came = np.empty(k, dtype=np.int32)
+    queue = np.empty(k, dtype=np.int32)
+    for source in np.argsort(-surplus + rng.random(k) * 0.5):
+        if surplus[source] <= 0 or not free[source]:
+            continue
+        came[:] = -1
+        came[source] = source
+        queue[0] = source
+        first, last, end = 0, 1, -1
+        while first < last and end < 0:
+            i = queue[first]
+            first += 1
+            for j in rng.permutation(k):
+                if came[j] < 0 and movable[i, j] > 0 and free[j]:
+                    came[j] = i
+                    queue[last] = j
+                    last += 1
+                    if surplus[j] < 0:
+                        end = j
+                        break
+        j = end
+        while j >= 0 and j != source:
+            i = came[j]
+            free[i] = free[j] = False
+            if _move_one(labels, i, j, weight, width):
+                moves += 1
+            else:
+                break
+            j = i
+    return moves
+
+
+@numba.njit(cache=True)
+def _move_one(labels, i, j, weight, width):  # type: ignore[no-untyped-def]
+    """Move a cell of weight 1 from i to j, the one with most neighbours in j; i has lost nothing since the search.
+
+    j may have lost one cell, so the neighbour in j must still be there.
+    """
+    best, best_score = -1, -9
+    for cell in range(width, len(labels) - width):
+        if labels[cell] == i and weight[cell] == 1:
+            score, touches = 0, False
+            for step in (-1, 1, -width, width):
+                there = labels[cell + step]
+                if there == j:
+                    touches = True
+                    score += 1
+                elif there == i:
+                    score -= 1
+            if touches and score > best_score:
+                best, best_score = cell, score
+    if best >= 0:
+        labels[best] = j
+        return True
+    return False
