@@ -26,8 +26,8 @@ class Division:
     """Who covers which hypervertex.
 
     `labels` (R, C) int32 holds the vehicle's index, -1 for nobody; `sizes`, `targets` (k,) int64 are cells had and aimed
-    at. `bound` (k,) int64: in any division some vehicle i has at least bound[i] cells, `proof` says why; `ratio` is the largest
-    sizes[i] / bound[i], so 1.0 is optimal. `reasons` tells what could not be as asked.
+    at. `bound` (k,) int64: in any division some vehicle i has at least bound[i] cells, `proof` says why; `ratio` is the
+    largest sizes[i] / bound[i], so 1.0 is optimal. `reasons` tells what could not be as asked.
     """
 
     labels: np.ndarray
@@ -105,7 +105,7 @@ def _checked(free: np.ndarray, starts: np.ndarray, shares: np.ndarray | None) ->
 
 def _in_free(free: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Return (k,) bool: which of the (k, 2) cells are free ones of the grid."""
-    inside: np.ndarray = ((cells >= 0) & (cells < free.shape)).all(axis=1)
+    inside = np.asarray(((cells >= 0) & (cells < free.shape)).all(axis=1))
     inside[inside] = free[cells[inside, 0], cells[inside, 1]]
     return inside
 
