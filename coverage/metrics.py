@@ -60,8 +60,8 @@ def swath(tracks: Sequence[np.ndarray], spacing: float) -> Geometry:
     pieces = [p for t in tracks for p in (straight_pieces(t),) if len(p)]
     if not pieces:
         return MultiPolygon()
-    lines = shapely.multilinestrings(shapely.linestrings(np.concatenate(pieces)))
-    return shapely.buffer(lines, spacing / 2.0, quad_segs=16)
+    lines = shapely.linestrings(np.concatenate(pieces))
+    return shapely.union_all(shapely.buffer(lines, spacing / 2.0, quad_segs=16))
 
 
 def straight_pieces(track: np.ndarray) -> np.ndarray:

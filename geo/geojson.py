@@ -1,7 +1,6 @@
 """Reading GeoJSON text and the geometry of its features, every problem told with its place."""
 
 import json
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -36,7 +35,9 @@ def parse(data: bytes) -> dict[str, Any]:
     if not isinstance(document.get("features"), list) or not document["features"]:
         raise InputError('"features" must be a list with at least one feature')
     crs = document.get("crs")
-    name = crs.get("properties", {}).get("name") if isinstance(crs, dict) else crs
+    name = crs
+    if isinstance(crs, dict):
+        name = crs["properties"].get("name") if isinstance(crs.get("properties"), dict) else None
     if crs is not None and name not in WGS84_NAMES:
         raise InputError(f"crs {str(name)[:60]!r} is not WGS84; export it as EPSG:4326 (longitude, latitude)")
     return document
@@ -64,8 +65,8 @@ def position_problem(position: Any) -> str | None:
         return f"a position must be [longitude, latitude], not {str(position)[:40]}"
     if any(isinstance(v, bool) or not isinstance(v, int | float) for v in position):
         return f"position {str(position)[:40]} must be numbers"
-    if not all(math.isfinite(v) for v in position):
-        return f"position {str(position)[:40]} is not finite"
+    if not all(abs(v) < 1e12 for v in position):  # so written it refuses NaN too, and whole numbers of any size
+        return f"position {str(position)[:40]} is not a place"
     lon, lat = position[:2]
     if abs(lat) > 90:
         swapped = "; is the order swapped? GeoJSON is longitude, latitude" if abs(lon) <= 90 and abs(lat) <= 180 else ""

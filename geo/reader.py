@@ -30,6 +30,7 @@ from quarterdeck.geo.scenario import (
     as_multipolygon,
 )
 
+POINTS = ("casualty", "medic", "rendezvous")
 MAX_RADIUS = 200_000.0  # m from the frame's origin: beyond it the projection's scale is off by more than 0.05 %
 
 
@@ -95,7 +96,7 @@ def _read(data: bytes, name: str) -> tuple[Scenario | None, list[str]]:
         return None, problems
     fleet = tuple(v for v in vehicles if v is not None)
     tasks = tuple(_task(f, frame) for f in features if f["role"] == "task")
-    points = {role: tuple((f["id"], _xy(f, frame)) for f in features if f["role"] == role) for role in GEOMETRIES}
+    points = {role: tuple((f["id"], _xy(f, frame)) for f in features if f["role"] == role) for role in POINTS}
     site = _site(features, shapes, [*fleet, *tasks], [xy for r in points for _, xy in points[r]])
     scenario = Scenario(
         name=document["name"] if isinstance(document.get("name"), str) else name,
@@ -135,14 +136,14 @@ def _feature(index: int, raw: Any, problems: list[str]) -> dict[str, Any] | None
     if role is None:
         problems.append(f'{place}: has no role; give it the property "role": one of {", ".join(GEOMETRIES)}')
         return None
-    if role not in GEOMETRIES:
+    if not isinstance(role, str) or role not in GEOMETRIES:
         near = get_close_matches(str(role), GEOMETRIES, n=1)
         hint = f"did you mean {near[0]!r}?" if near else f"use one of {', '.join(GEOMETRIES)}"
         problems.append(f"{place}: unknown role {str(role)[:40]!r}; {hint}")
         return None
     geometry: dict[str, Any] = raw["geometry"] if isinstance(raw.get("geometry"), dict) else {}
     kind = geometry.get("type")
-    if kind not in GEOMETRIES[role]:
+    if not isinstance(kind, str) or kind not in GEOMETRIES[role]:
         problems.append(f"{place}: a feature of role {role} must be a {' or '.join(GEOMETRIES[role])}, not {kind}")
         return None
     found = [f"{place}: {p}" for p in property_problems(role, properties)]
@@ -179,8 +180,11 @@ def _shapes(features: Sequence[dict[str, Any]], frame: Frame, problems: list[str
     shapes = {}
     for f in features:
         xy = frame.to_metres(np.array([p[:2] for p in positions(f["geometry"])], dtype=float))
+        if not len(xy):
+            problems.append(f"{f['place']}: the geometry has no positions")
+            continue
         far = float(np.hypot(*xy.T).max()) if np.isfinite(xy).all() else float("inf")
-        if far > MAX_RADIUS and f["role"] in ("vehicle", "task", "casualty", "medic", "rendezvous"):
+        if far > MAX_RADIUS and f["geometry"]["type"] == "Point":
             problems.append(
                 f"{f['place']}: is {far / 1000:,.0f} km from the site's centre, more than {MAX_RADIUS / 1000:.0f} km"
             )

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from quarterdeck import __version__
 from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.version import VERSION
 from quarterdeck.mission.mission import Mission, Route
 from quarterdeck.physics.swath import covered_fraction, driven_tracks, planned_tracks
 from quarterdeck.physics.swept import Swept, closest_approaches, sweep
@@ -144,7 +144,7 @@ def measure(
     )
     figures = _figures(mission, trace, vehicles, served)
     reasons = _reasons(mission, vehicles, figures, allowed)
-    return Report(mission.name, __version__, settings, allowed, figures, vehicles, tuple(reasons), trace.hash)
+    return Report(mission.name, VERSION, settings, allowed, figures, vehicles, tuple(reasons), trace.hash)
 
 
 def _vehicle(

@@ -1,8 +1,19 @@
 """Quarterdeck plans, proves and exports missions for fleets on land, at sea and in the air."""
 
-from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING, Any
 
-try:
-    __version__ = version("quarterdeck")
-except PackageNotFoundError:  # a clone on the path that was never installed
-    __version__ = "0.0.0"
+from quarterdeck.geo.version import VERSION as __version__
+
+if TYPE_CHECKING:
+    from quarterdeck.api import plan, read_plan, read_scenario, simulate, write_plan
+
+__all__ = ["__version__", "plan", "read_plan", "read_scenario", "simulate", "write_plan"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the library's functions when they are first asked for: the command line's `--help` needs none."""
+    if name in __all__:
+        from quarterdeck import api
+
+        return getattr(api, name)
+    raise AttributeError(f"module 'quarterdeck' has no attribute {name!r}")

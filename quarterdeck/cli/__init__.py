@@ -12,6 +12,7 @@ from quarterdeck.geo.errors import QuarterdeckError
 
 VERBS = {
     "init": "A small site to start from.",
+    "plan": "Cover an area.",
     "reproduce": "A paper's tables beside ours.",
     "simulate": "Execute a plan in PyBullet; report and verdict.",
 }

@@ -1,0 +1,84 @@
+"""Corners that a vehicle can drive: arcs of its turn radius where they fit, Dubins curves where they do not."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from shapely import LineString, MultiPolygon
+
+from quarterdeck.geo.dubins import CHORD, dubins_paths
+from quarterdeck.mission.mission import Leg
+
+
+def with_turns(
+    points: np.ndarray, legs: Sequence[Leg], radius: float, space: MultiPolygon
+) -> tuple[np.ndarray, list[Leg], list[np.ndarray]]:
+    """Put a Dubins curve, of legs `turn`, wherever an arc of `radius` metres does not fit between two legs.
+
+    `points` (n, 2) metres, `legs[i]` ends at point i; curves stay inside `space`. Returns the points, their legs, and the
+    corners (2,) for which no curve has room: they stay as they are. Corners that an arc rounds need nothing: the vehicle
+    cuts them. Of two corners that are too near to each other, one curve makes both.
+    """
+    points = np.asarray(points, dtype=float)
+    if radius <= 0 or len(points) < 3:
+        return points, list(legs), []
+    heading, bend, length = _bends(points)
+    tangent = radius * np.tan(np.minimum(np.abs(bend), math.pi - 1e-6) / 2)
+    crowded = tangent[:-1] + tangent[1:] > length + 1e-9
+    shapely.prepare(space)
+    out, kinds, stuck = [points[0]], [legs[0]], []
+    i = 1
+    while i < len(points):
+        last = i == len(points) - 1
+        if last or not (crowded[i - 1] or crowded[i]) or abs(bend[i]) < 1e-6:
+            out.append(points[i])
+            kinds.append(legs[i])
+            i += 1
+            continue
+        j = i + 1 if crowded[i] and i + 2 < len(points) and abs(bend[i + 1]) > 1e-6 else i
+        start, goal = (*points[i], heading[i - 1]), (*points[j], heading[j])
+        curve = next((c for c in dubins_paths(start, goal, radius) if space.covers(LineString(c))), None)
+        out.append(points[i])
+        kinds.append(legs[i])
+        if curve is None:
+            stuck.append(points[i])
+            i += 1
+            continue
+        out += list(curve[1:])
+        kinds.extend(["turn"] * (len(curve) - 1))
+        i = j + 1
+    return np.array(out), kinds, stuck
+
+
+def driven(points: np.ndarray, radius: float) -> np.ndarray:
+    """Return the (m, 2) polyline with the corners of (n, 2) `points` rounded to arcs of `radius` metres where they fit."""
+    points = np.asarray(points, dtype=float)
+    if radius <= 0 or len(points) < 3:
+        return points
+    heading, bend, length = _bends(points)
+    tangent = radius * np.tan(np.minimum(np.abs(bend), math.pi - 1e-6) / 2)
+    fits = np.ones(len(points), dtype=bool)
+    fits[:-1] &= tangent[:-1] + tangent[1:] <= length + 1e-9
+    fits[1:] &= tangent[:-1] + tangent[1:] <= length + 1e-9
+    out = [points[:1]]
+    for i in range(1, len(points) - 1):
+        if not fits[i] or abs(bend[i]) < CHORD:
+            out.append(points[i : i + 1])
+            continue
+        side = math.copysign(1.0, bend[i])
+        first = points[i] - tangent[i] * np.array([math.cos(heading[i - 1]), math.sin(heading[i - 1])])
+        angles = heading[i - 1] + np.linspace(0.0, bend[i], 1 + math.ceil(abs(bend[i]) / CHORD))
+        centre = first + side * radius * np.array([-math.sin(heading[i - 1]), math.cos(heading[i - 1])])
+        out.append(centre + side * radius * np.column_stack([np.sin(angles), -np.cos(angles)]))
+    out.append(points[-1:])
+    return np.concatenate(out)
+
+
+def _bends(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return (n - 1,) headings of the legs, (n,) turns at the points (0 at the ends), (n - 1,) lengths."""
+    step = np.diff(points, axis=0)
+    heading = np.arctan2(step[:, 1], step[:, 0])
+    bend = np.zeros(len(points))
+    bend[1:-1] = (np.diff(heading) + math.pi) % math.tau - math.pi
+    return heading, bend, np.hypot(*step.T)

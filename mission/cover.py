@@ -1,0 +1,307 @@
+"""Covering an area: place the grid, divide it, make a tour of each region, and a route of each tour.
+
+The pipeline of ecdis-sa-darp: WGS84 area and obstacles, grid placement by annealing, proportional division, spanning tree
+coverage, paths.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon
+
+from quarterdeck.coverage.division import Division, distinct_entries, divide
+from quarterdeck.coverage.metrics import measure, straight_pieces, uncovered
+from quarterdeck.coverage.parts import allot, connected_parts, whole_targets
+from quarterdeck.coverage.placement import Method, place
+from quarterdeck.coverage.shares import shares
+from quarterdeck.coverage.tour import tours
+from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.grid import Grid
+from quarterdeck.geo.scenario import Scenario, Vehicle, as_multipolygon
+from quarterdeck.geo.transit import Roadmap, roadmap, shortest_paths
+from quarterdeck.geo.version import VERSION
+from quarterdeck.mission.corners import driven, with_turns
+from quarterdeck.mission.mission import Layer, Leg, Mission, Route
+from quarterdeck.mission.timing import shortfalls, timed_route
+
+MAX_HYPERVERTICES = 4_000_000
+LAYER_STEP = 5.0  # m between the altitudes at which aerial vehicles transit
+
+
+def cover(
+    scenario: Scenario,
+    *,
+    spacing: float | None = None,
+    seed: int = 0,
+    placement: Method = "annealed",
+    angle: float | None = None,
+) -> Mission:
+    """Return the mission that covers the scenario's areas with all its vehicles.
+
+    `spacing` is metres between neighbouring tracks (the paper's 2 delta), `angle` fixes the lattice's direction in radians
+    counter-clockwise from east. Raises InputError if there is nothing to cover or nobody to cover it, or no spacing, or
+    the area holds no free cell at this spacing. What vehicles cannot do is told in the mission's `reasons`.
+    """
+    vehicles = scenario.vehicles
+    if not scenario.site.areas:
+        raise InputError('no feature has the role "area"; draw what is to be covered')
+    if not vehicles:
+        raise InputError('no feature has the role "vehicle"; add a Point with "role": "vehicle" where one starts')
+    parts_of_all = shares(vehicles)
+    step = track_spacing(scenario, spacing)
+    grid = place(trackable(scenario, step), step, seed=seed, method=placement, angle=angle).grid
+    roads = _roadmaps(scenario)
+    regions, notes = _regions(grid, vehicles, parts_of_all, roads, seed)
+    tracks = [[grid.centres(t) for t in region.tours] for region in regions]
+    routes, reasons = _routes(vehicles, tracks, roads)
+    site = scenario.site
+    figures = asdict(measure([np.vstack([t, t[:1]]) for own in tracks for t in own], site.coverable, grid))
+    missed = uncovered(
+        [t for v, r in zip(vehicles, routes, strict=True) for t in survey_tracks(v, r)], site.coverable, step
+    )
+    cells = np.array([region.cells for region in regions])
+    figures |= {
+        "poc_with_turns": 1.0 - missed.area / site.coverable.area,
+        "hypervertices": int(grid.hypervertices.sum()),
+        "makespan": max(r.duration for r in routes),
+        "energy": sum(r.energy for r in routes),
+        "shares": cells / cells.sum(),
+        "notes": notes,
+        "share_error_hypervertices": float(np.abs(cells - parts_of_all * cells.sum()).max()),
+    }
+    return Mission(
+        name=scenario.name,
+        frame=scenario.frame,
+        site=site,
+        vehicles=vehicles,
+        routes=routes,
+        method="stc",
+        parameters={"spacing": step, "placement": placement, "angle": grid.angle},
+        seed=seed,
+        spacing=step,
+        tasks=scenario.tasks,
+        figures=figures,
+        bounds={"moves": max(region.bound for region in regions)},
+        reasons=tuple(reasons),
+        layers=(_region_layer(grid, vehicles, regions),),
+        input_hash=scenario.input_hash,
+        version=VERSION,
+    )
+
+
+def track_spacing(scenario: Scenario, given: float | None = None) -> float:
+    """Return metres between neighbouring tracks: as given, else the scenario's, else the least swath of its sensors.
+
+    Raises InputError if none says it, or the area would need more hypervertices than this machine can hold.
+    """
+    swaths = [v.sensor.swath for v in scenario.vehicles if v.sensor is not None and v.sensor.swath is not None]
+    spacing = (
+        given if given is not None else scenario.spacing if scenario.spacing is not None else min(swaths, default=None)
+    )
+    if spacing is None:
+        raise InputError('no spacing: give --spacing METRES, or an area the property "spacing", or vehicles a sensor')
+    if not (np.isfinite(spacing) and spacing > 0):
+        raise InputError(f"spacing {spacing:g} m must be a positive number of metres")
+    least = float(np.sqrt(scenario.site.coverable.area / (4 * MAX_HYPERVERTICES)))
+    if spacing < least:
+        raise InputError(
+            f"spacing {spacing:g} m makes more than {MAX_HYPERVERTICES:,} hypervertices; at least {least:.3g} m works"
+        )
+    return float(spacing)
+
+
+def trackable(scenario: Scenario, spacing: float) -> MultiPolygon:
+    """Return where survey tracks may lie: in the areas, off every obstacle, with the vehicles' clearance. Metres.
+
+    Raises InputError if that is nowhere.
+    """
+    space = scenario.site.coverable
+    if space.is_empty:
+        raise InputError("obstacles take up all of the area; nothing is left to cover")
+    for domain in sorted({v.domain for v in scenario.vehicles}):
+        clearance = max(v.clearance for v in scenario.vehicles if v.domain == domain)
+        space = as_multipolygon(space.intersection(scenario.site.navigable(domain, clearance)))
+    if space.is_empty:
+        raise InputError(
+            f"no part of the area is free at spacing {spacing:g} m and the vehicles' clearance; lessen one of them"
+        )
+    return space
+
+
+def _roadmaps(scenario: Scenario) -> list[Roadmap]:
+    """Return each vehicle's roadmap; vehicles of one domain and clearance share it."""
+    made: dict[tuple[str, float], Roadmap] = {}
+    for v in scenario.vehicles:
+        if (v.domain, v.clearance) not in made:
+            made[v.domain, v.clearance] = roadmap(scenario.site.navigable(v.domain, v.clearance))
+    return [made[v.domain, v.clearance] for v in scenario.vehicles]
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """What one vehicle covers: (R, C) bool `mask` of hypervertices, closed `tours` of (n, 2) path cells, one a part.
+
+    `bound` is the path moves that the longest tour of its parts has at least.
+    """
+
+    mask: np.ndarray
+    tours: list[np.ndarray]
+    bound: int
+
+    @property
+    def cells(self) -> int:
+        """Hypervertices covered."""
+        return int(self.mask.sum())
+
+
+def _regions(
+    grid: Grid, vehicles: Sequence[Vehicle], parts_of_all: np.ndarray, roads: Sequence[Roadmap], seed: int
+) -> tuple[list[Region], list[str]]:
+    """Divide the free hypervertices, each connected part among those that a transport problem sends there.
+
+    Returns the vehicles' regions, and notes on shares that could not be had.
+    """
+    free, k = grid.hypervertices, len(vehicles)
+    numbers, count = connected_parts(free)
+    sizes = np.bincount(numbers[free], minlength=count)
+    counts = allot(sizes, whole_targets(int(sizes.sum()), parts_of_all), _distances(grid, numbers, count, vehicles, roads))
+    masks = np.zeros((k, *free.shape), dtype=bool)
+    walks: list[list[np.ndarray]] = [[] for _ in range(k)]
+    bounds = [0] * k
+    notes: list[str] = []
+    starts = np.array([v.start for v in vehicles])
+    for part in range(count):
+        here = np.flatnonzero(counts[:, part])
+        inside = numbers == part
+        entries = distinct_entries(inside, (grid.cells_at(starts[here]) + 0.5) / 2)
+        division: Division = divide(inside, entries, counts[here, part] / sizes[part], seed=seed)
+        for vehicle, walk, own in zip(here, tours(division.labels, entries), range(len(here)), strict=True):
+            masks[vehicle] |= division.labels == own
+            walks[vehicle].append(walk)
+            bounds[vehicle] = max(bounds[vehicle], division.bound_moves)
+        notes += division.reasons
+    return [Region(masks[i], walks[i], bounds[i]) for i in range(k)], notes
+
+
+def _distances(
+    grid: Grid, numbers: np.ndarray, count: int, vehicles: Sequence[Vehicle], roads: Sequence[Roadmap]
+) -> np.ndarray:
+    """Return the (k, p) metres from each vehicle's start to the nearest hypervertex of each part."""
+    distances = np.zeros((len(vehicles), count))
+    if count == 1:
+        return distances
+    for part in range(count):
+        centres = grid.centres(2 * np.argwhere(numbers == part) + 0.5)
+        for i, vehicle in enumerate(vehicles):
+            nearest = centres[np.argmin(((centres - vehicle.start) ** 2).sum(axis=1))]
+            distances[i, part] = shortest_paths(roads[i], np.array([vehicle.start]), nearest)[0][0, 0]
+    return distances
+
+
+def _routes(
+    vehicles: Sequence[Vehicle], tracks: Sequence[Sequence[np.ndarray]], roads: Sequence[Roadmap]
+) -> tuple[tuple[Route, ...], list[str]]:
+    """Return each vehicle's route: out, round its closed tracks, home; and why some cannot be done."""
+    routes, reasons = [], []
+    for i, (vehicle, own, road) in enumerate(zip(vehicles, tracks, roads, strict=True)):
+        points, legs, missing = _path(vehicle, own, road)
+        points, legs, stuck = with_turns(points, legs, vehicle.turn_radius, road.polygon)
+        reasons += missing + [
+            f"{vehicle.id}: no room to turn at {vehicle.turn_radius:g} m, {x:.0f} m east and {y:.0f} m north of the centre"
+            for x, y in stuck
+        ]
+        height = np.zeros(len(points))
+        if vehicle.domain == "aerial":
+            survey = np.array([leg == "survey" for leg in legs])
+            height = np.where(survey, vehicle.altitude, vehicle.altitude + (i + 1) * LAYER_STEP)
+        wait = _launch_delay(vehicles, i)
+        xyz = np.column_stack([points, height])
+        if vehicle.domain == "aerial":
+            xyz, legs = _with_takeoff(xyz, legs)
+        route = timed_route(vehicle, xyz, legs, holds=[wait, *[0.0] * (len(xyz) - 1)])
+        routes.append(route)
+        reasons += shortfalls(vehicle, route)
+    return tuple(routes), reasons
+
+
+def _path(vehicle: Vehicle, tracks: Sequence[np.ndarray], road: Roadmap) -> tuple[np.ndarray, list[Leg], list[str]]:
+    """Return (n, 2) metres along transits and closed tracks, nearest first, the kind of each leg, and what fails."""
+    points, legs, missing = [np.array([vehicle.start])], ["start"], []  # type: list[np.ndarray], list[Leg], list[str]
+    here, left = np.array(vehicle.start), list(tracks)
+    while left:
+        nearest = [int(((t - here) ** 2).sum(axis=1).argmin()) for t in left]
+        lengths, ways = shortest_paths(road, here, np.array([t[n] for t, n in zip(left, nearest, strict=True)]))
+        chosen = int(lengths[0].argmin())
+        track, entry, way = left.pop(chosen), nearest[chosen], ways[0][chosen]
+        if way is None:
+            missing.append(f"{vehicle.id}: no way from its start to its region; move the start, or lessen its clearance")
+            continue
+        loop = _straightened(np.concatenate([track[entry:], track[:entry], track[entry : entry + 1]]))
+        points += [way[1:], loop[1:]]
+        legs.extend(["transit"] * (len(way) - 1))
+        legs.extend(["survey"] * (len(loop) - 1))
+        here = loop[-1]
+    way = shortest_paths(road, here, np.array(vehicle.home))[1][0][0]
+    if way is None:
+        missing.append(f"{vehicle.id}: no way from its region to its end; move the end, or lessen its clearance")
+    elif len(points) > 1 or vehicle.home != vehicle.start:
+        points.append(way[1:])
+        legs += ["transit"] * (len(way) - 1)
+    return np.concatenate(points), legs, missing
+
+
+def _straightened(line: np.ndarray) -> np.ndarray:
+    """Return an (n, 2) polyline without the points in the middle of its straight runs."""
+    pieces = straight_pieces(line)
+    return np.concatenate([pieces[:, 0], pieces[-1:, 1]])
+
+
+def survey_tracks(vehicle: Vehicle, route: Route) -> list[np.ndarray]:
+    """Return the (n, 2) lines in metres along which a route surveys, corners rounded as the vehicle drives them."""
+    xy, survey = route.xyz[:, :2], route.survey
+    starts = np.flatnonzero(survey & ~np.roll(survey, 1)) - 1
+    ends = np.flatnonzero(survey & ~np.roll(survey, -1))
+    return [driven(xy[a : b + 1], vehicle.turn_radius) for a, b in zip(starts, ends, strict=True)]
+
+
+def _launch_delay(vehicles: Sequence[Vehicle], index: int) -> float:
+    """Return seconds that a vehicle waits at its start, so that those beside it are clear before it leaves."""
+    own = vehicles[index]
+    room = 2 * (own.clearance + own.model.length)
+    ahead = [v for v in vehicles[:index] if v.domain == own.domain and np.hypot(*np.subtract(v.start, own.start)) < room]
+    return float(sum(2 * room / v.speed for v in ahead))
+
+
+def _with_takeoff(xyz: np.ndarray, legs: list[Leg]) -> tuple[np.ndarray, list[Leg]]:
+    """Put a climb at the start and a descent at the end of an aerial path; changes of altitude are made on the spot."""
+    rows: list[np.ndarray] = [np.array([*xyz[0, :2], 0.0])]
+    kinds: list[Leg] = ["start"]
+    for i, (row, leg) in enumerate(zip(xyz, legs, strict=True)):
+        if i == 0:
+            rows.append(np.array([*row[:2], xyz[min(1, len(xyz) - 1), 2]]))
+            kinds.append("takeoff")
+            continue
+        if row[2] != rows[-1][2]:
+            rows.append(np.array([*rows[-1][:2], row[2]]))
+            kinds.append("transit")
+        rows.append(row)
+        kinds.append(leg)
+    rows.append(np.array([*xyz[-1, :2], 0.0]))
+    kinds.append("landing")
+    return np.array(rows), kinds
+
+
+def _region_layer(grid: Grid, vehicles: Sequence[Vehicle], regions: Sequence[Region]) -> Layer:
+    """Return each vehicle's region as an outline in metres."""
+    shapes: list[Any] = []
+    for region in regions:
+        rows, starts = np.nonzero(np.diff(region.mask.astype(np.int8), axis=1, prepend=0, append=0) == 1)
+        ends = np.nonzero(np.diff(region.mask.astype(np.int8), axis=1, prepend=0, append=0) == -1)[1]
+        boxes = shapely.box(starts, rows, ends, rows + 1)
+        outline = shapely.union_all(boxes)
+        corners = shapely.get_coordinates(outline)
+        shapes.append(shapely.set_coordinates(outline, grid.centres(2 * corners[:, ::-1] - 0.5)))
+    return Layer("region", tuple(shapes), tuple({"vehicle": v.id} for v in vehicles))

@@ -1,0 +1,39 @@
+"""The library's front door: `read_scenario`, `plan`, `simulate`, `export` tell the whole story.
+
+Each stage is imported when it is first called, so that importing the package costs nothing.
+"""
+
+from pathlib import Path
+from typing import Any, Literal
+
+from quarterdeck.geo.reader import read_scenario
+from quarterdeck.geo.scenario import Scenario
+from quarterdeck.mission.mission import Mission
+from quarterdeck.mission.planfile import plan_text, read_plan
+
+__all__ = ["plan", "plan_text", "read_plan", "read_scenario", "simulate", "write_plan"]
+
+
+def plan(scenario: Scenario, *, method: Literal["stc"] = "stc", seed: int = 0, **options: Any) -> Mission:
+    """Return a mission that covers the scenario's areas.
+
+    `stc` divides a placed grid and walks spanning trees (`quarterdeck.mission.cover.cover`); `options` are that planner's,
+    such as `spacing` in metres. Raises InputError if the scenario cannot be planned as it is.
+    """
+    from quarterdeck.mission.cover import cover
+
+    return {"stc": cover}[method](scenario, seed=seed, **options)
+
+
+def simulate(mission: Mission, **options: Any) -> Any:
+    """Execute a mission in PyBullet and return its run: trace and report (`quarterdeck.physics.simulate.simulate`)."""
+    from quarterdeck.physics.simulate import simulate as run
+
+    return run(mission, **options)
+
+
+def write_plan(mission: Mission, path: str | Path, *, force: bool = False) -> Path:
+    """Write the PLAN file and return its path. Raises InputError if it exists and not `force`, or cannot be written."""
+    from quarterdeck.geo.files import write_file
+
+    return write_file(Path(path), plan_text(mission), force=force)

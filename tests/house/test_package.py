@@ -1,0 +1,78 @@
+"""The package: what a wheel holds, how the command line behaves at its edges."""
+
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+ROOMS = ("geo", "coverage", "mission", "physics", "exporters")
+
+
+def quarterdeck(*arguments, cwd=ROOT, **options):
+    """Run the command line in a process of its own."""
+    command = [sys.executable, "-m", "quarterdeck", *arguments]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False, **options)
+
+
+def test_wheel_holds_every_room(tmp_path):
+    """A wheel has each module of each room as a regular file, the samples, the schemas and the type marker."""
+    pytest.importorskip("build", reason="the package `build` is not installed")
+    command = [sys.executable, "-m", "build", "--wheel", "--outdir", str(tmp_path), str(ROOT)]
+    subprocess.run(command, check=True, capture_output=True)
+    names = set(zipfile.ZipFile(next(tmp_path.glob("*.whl"))).namelist())
+    expected = {f"quarterdeck/{p.relative_to(ROOT)}" for r in ROOMS for p in (ROOT / r).rglob("*.py")}
+    expected |= {str(p.relative_to(ROOT)) for p in (ROOT / "quarterdeck").glob("*.py")}
+    expected |= {f"quarterdeck/data/{p.name}" for p in (ROOT / "data").glob("*.geojson")}
+    expected |= {f"quarterdeck/data/vehicles/{p.name}" for p in (ROOT / "data" / "vehicles").glob("*.toml")}
+    expected |= {"quarterdeck/py.typed", "quarterdeck/geo/site.schema.json"}
+    assert not expected - names
+    assert not {n for n in names if n.split("/")[0] not in ("quarterdeck",) and ".dist-info" not in n}
+
+
+def test_mypy_sees_every_module():
+    """Mypy's packages setting reaches all rooms: the number of files checked is the number of files there are."""
+    pytest.importorskip("mypy", reason="mypy is not installed")
+    done = subprocess.run([sys.executable, "-m", "mypy"], cwd=ROOT, capture_output=True, text=True, check=False)
+    files = [p for r in (*ROOMS, "quarterdeck") for p in (ROOT / r).rglob("*.py") if not p.is_symlink()]
+    assert f"in {len(files)} source files" in done.stdout or f"checked {len(files)} source files" in done.stdout
+
+
+@pytest.mark.parametrize(
+    "code", ["import quarterdeck", "import numba, quarterdeck.geo.transit", "import coverage; coverage.Coverage"]
+)
+def test_root_as_working_directory(code):
+    """Running Python in a clone, its root on sys.path, breaks nothing: `coverage` is still coverage.py."""
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONSAFEPATH"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False, env=environment
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_help_imports_nothing_heavy():
+    """`--help` does not import the libraries that take long."""
+    code = "import sys\nfrom quarterdeck.cli import main\ntry:\n    main(['--help'])\nexcept SystemExit:\n    pass\n"
+    code += "heavy = {'numpy', 'numba', 'shapely', 'scipy', 'pybullet'} & set(sys.modules)\nassert not heavy, heavy"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "plan" in done.stdout
+
+
+def test_nearest_verb_is_suggested():
+    """A mistyped verb or option exits with 2 and suggests the nearest."""
+    done = quarterdeck("plam")
+    assert done.returncode == 2
+    assert "did you mean 'plan'" in done.stderr
+
+
+def test_input_error_is_one_line_and_writes_nothing(tmp_path):
+    """Wrong input: one line on standard error, status 2, no file."""
+    (tmp_path / "bad.geojson").write_text("hello")
+    done = quarterdeck("plan", str(tmp_path / "bad.geojson"), "-o", str(tmp_path / "plan.geojson"))
+    assert done.returncode == 2
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "plan.geojson").exists()
