@@ -25,9 +25,11 @@ class Squad(ABC):
     columns: int
     actuators: int
 
-    def __init__(self, vehicles: Sequence[Vehicle], index: np.ndarray, position: np.ndarray, heading: np.ndarray) -> None:
+    def __init__(
+        self, vehicles: Sequence[Vehicle], index: np.ndarray, position: np.ndarray, heading: np.ndarray, seed: int = 0
+    ) -> None:
         count = len(vehicles)
-        self.vehicles, self.index = vehicles, index
+        self.vehicles, self.index, self.seed = vehicles, index, seed
         self.limits, self.tracks = vehicle_limits(vehicles), empty_tracks(count)
         self.table = np.zeros(0, WAYPOINT)
         self.state = np.zeros((count, self.columns))
@@ -146,6 +148,7 @@ class Rovers(Squad):
 
     def begin(self, position: np.ndarray, heading: np.ndarray) -> None:
         self.state[:, :2], self.state[:, rover.PSI] = position[:, :2], heading
+        self.ground = np.random.default_rng(self.seed)
         self.speed, self.turn = np.zeros(len(heading)), np.zeros(len(heading))
 
     def guide(self, time: float, step: float) -> None:
@@ -155,7 +158,9 @@ class Rovers(Squad):
         )
 
     def drive(self, step: float, current: np.ndarray, wind: np.ndarray) -> None:
-        rover.drive_rovers(self.state, self.parameters, self.active, self.speed, self.turn, self.scale, step)
+        rough = self.parameters["roughness"][:, None] * self.ground.standard_normal((len(self.state), 2))
+        scale = self.scale * (1.0 + rough)
+        rover.drive_rovers(self.state, self.parameters, self.active, self.speed, self.turn, scale, step)
 
     def pose(self) -> tuple[np.ndarray, np.ndarray]:
         return np.column_stack([self.state[:, :2], np.zeros(len(self.state))]), self.state[:, rover.PSI]
@@ -222,11 +227,11 @@ class Multirotors(Squad):
 KINDS: dict[str, type[Squad]] = {"surface": Vessels, "ground": Rovers, "aerial": Multirotors}
 
 
-def form_squads(vehicles: Sequence[Vehicle], position: np.ndarray, heading: np.ndarray) -> list[Squad]:
+def form_squads(vehicles: Sequence[Vehicle], position: np.ndarray, heading: np.ndarray, seed: int = 0) -> list[Squad]:
     """Return a squad for each domain that has vehicles. Raises InputError if a model's [dynamics] are wrong."""
     squads = []
     for domain, kind in KINDS.items():
         index = np.array([i for i, v in enumerate(vehicles) if v.domain == domain], dtype=int)
         if len(index):
-            squads.append(kind([vehicles[i] for i in index], index, position[index], heading[index]))
+            squads.append(kind([vehicles[i] for i in index], index, position[index], heading[index], seed))
     return squads

@@ -27,7 +27,7 @@ COLUMNS = 21  # Z: integral of the position error; ENERGY in Wh
 PHYSICAL = 17
 SUBSTEP = 0.01  # s
 GRAVITY = 9.80665  # m/s2
-CEILING = 0.6  # radians: the greatest tilt asked for
+CEILING = 0.78  # radians: the greatest tilt asked for
 
 PARAMETERS = np.dtype(
     [(n, float) for n in ("mass", "jx", "jy", "jz", "dx", "dy", "torque", "most", "lag", "drag", "drag2", "bandwidth")]
@@ -128,16 +128,20 @@ def heading_of(s: np.ndarray) -> float:
 @njit(cache=True)
 def _control(s: np.ndarray, p: Any, target: np.ndarray, dt: float, q: np.ndarray) -> None:
     """Set the rotor commands q[0:4] in newtons for the target position, velocity and heading."""
-    kv = p.bandwidth / 4
+    kv = p.bandwidth / 3
     kp = kv / 2.2
-    ki = kp * kv / 6
+    ki = kp * kv / 5
     ax = _axis(s, p, target, 0, kp, kv, ki, dt)
     ay = _axis(s, p, target, 1, kp, kv, ki, dt)
     az = min(max(_axis(s, p, target, 2, kp, kv, ki, dt), -0.5 * GRAVITY), 0.8 * GRAVITY) + GRAVITY
     level = np.hypot(ax, ay)
     steep = np.tan(CEILING) * az
-    if level > steep:
-        ax, ay = ax * steep / level, ay * steep / level
+    if level > steep:  # what it cannot have is taken from along the path first, so that it falls behind and not off
+        cos, sin = np.cos(target[6]), np.sin(target[6])
+        across = min(max(-sin * ax + cos * ay, -steep), steep)
+        rest = np.sqrt(steep * steep - across * across)
+        along = min(max(cos * ax + sin * ay, -rest), rest)
+        ax, ay = cos * along - sin * across, sin * along + cos * across
     size = np.sqrt(ax * ax + ay * ay + az * az)
     zx, zy, zz = ax / size, ay / size, az / size
     # The wanted body axes: z along the thrust, x as near to the heading as that allows.

@@ -21,7 +21,19 @@ SUBSTEP = 0.05  # s
 PARAMETERS = np.dtype(
     [
         (n, float)
-        for n in ("separation", "multiplier", "slip", "lag", "accel", "wheel_speed", "idle", "watts", "cruise", "exponent")
+        for n in (
+            "separation",
+            "multiplier",
+            "slip",
+            "lag",
+            "accel",
+            "wheel_speed",
+            "idle",
+            "watts",
+            "cruise",
+            "exponent",
+            "roughness",
+        )
     ]
 )
 
@@ -36,6 +48,7 @@ def rover_parameters(model: VehicleModel) -> np.ndarray:
     p["accel"], p["wheel_speed"] = number(model, "wheel_acceleration", least=1e-3), number(model, "wheel_speed", least=1e-3)
     if p["wheel_speed"] < model.max_speed:
         raise InputError(f"vehicle model {model.name!r}: [dynamics] wheel_speed is below [limits] max_speed")
+    p["roughness"] = number(model, "roughness", least=0.0)
     p["idle"], p["watts"] = model.power_idle, model.power_cruise - model.power_idle
     p["cruise"], p["exponent"] = model.speed, model.power_exponent
     return p
@@ -54,7 +67,7 @@ def drive_rovers(
     """Advance all rovers by `step` seconds, in place.
 
     `state` (k, COLUMNS), `parameters` (k,) records; those not `active` (k,) stay as they are; `speed` (k,) m/s and
-    `turn` (k,) rad/s are held; `scale` (k, 2) is the part of its speed that each side can still reach.
+    `turn` (k,) rad/s are held; `scale` (k, 2) is the part of its wheels' commanded speed that each side really turns at.
     """
     count = max(1, int(np.ceil(step / SUBSTEP - 1e-9)))
     dt = step / count

@@ -135,7 +135,7 @@ class _Running:
         self.count = len(vehicles)
         routes = {route.vehicle: route.waypoints for route in self.mission.routes}
         self.position, self.heading = _starts(self.mission, routes)
-        self.squads = form_squads(vehicles, self.position, self.heading)
+        self.squads = form_squads(vehicles, self.position, self.heading, self.seed)
         self.home = np.array([v.home for v in vehicles], float).reshape(-1, 2)
         self.start = self.position[:, :2].copy()
         self.harbour = np.array([HARBOUR * v.model.length for v in vehicles])
