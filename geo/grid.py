@@ -123,7 +123,7 @@ def _inside(edges: np.ndarray, rows: int, columns: int) -> tuple[np.ndarray, np.
             start = int(np.ceil(x[at] - 0.5))
             stop = int(np.ceil(x[at + 1] - 0.5))
             cells[i, start:stop] = True
-            along[i, start : stop - 1] = True
+            along[i, start : max(start, stop - 1)] = True  # stop may be 0, and -1 would be the last
     return cells, along
 
 
