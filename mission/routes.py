@@ -1,0 +1,107 @@
+"""From closed survey tracks to routes: out, round them, home; launches staggered, altitudes layered, corners drivable."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from quarterdeck.coverage.metrics import straight_pieces
+from quarterdeck.geo.scenario import Vehicle
+from quarterdeck.geo.transit import Roadmap, shortest_paths
+from quarterdeck.mission.corners import driven, with_turns
+from quarterdeck.mission.mission import Leg, Route
+from quarterdeck.mission.timing import shortfalls, timed_route
+
+LAYER_STEP = 5.0  # m between the altitudes at which aerial vehicles transit
+
+
+def survey_routes(
+    vehicles: Sequence[Vehicle], tracks: Sequence[Sequence[np.ndarray]], roads: Sequence[Roadmap]
+) -> tuple[tuple[Route, ...], list[str]]:
+    """Return each vehicle's route: out, round its closed tracks, home; and why some cannot be done."""
+    routes, reasons = [], []
+    for i, (vehicle, own, road) in enumerate(zip(vehicles, tracks, roads, strict=True)):
+        points, legs, missing = _path(vehicle, own, road)
+        points, legs, stuck = with_turns(points, legs, vehicle.turn_radius, road.polygon)
+        reasons += missing + [
+            f"{vehicle.id}: no room to turn at {vehicle.turn_radius:g} m, {x:.0f} m east and {y:.0f} m north of the centre"
+            for x, y in stuck
+        ]
+        height = np.zeros(len(points))
+        if vehicle.domain == "aerial":
+            survey = np.array([leg == "survey" for leg in legs])
+            height = np.where(survey, vehicle.altitude, vehicle.altitude + (i + 1) * LAYER_STEP)
+        wait = _launch_delay(vehicles, i)
+        xyz = np.column_stack([points, height])
+        if vehicle.domain == "aerial":
+            xyz, legs = _with_takeoff(xyz, legs)
+        route = timed_route(vehicle, xyz, legs, holds=[wait, *[0.0] * (len(xyz) - 1)])
+        routes.append(route)
+        reasons += shortfalls(vehicle, route)
+    return tuple(routes), reasons
+
+
+def _path(vehicle: Vehicle, tracks: Sequence[np.ndarray], road: Roadmap) -> tuple[np.ndarray, list[Leg], list[str]]:
+    """Return (n, 2) metres along transits and closed tracks, nearest first, the kind of each leg, and what fails."""
+    points, legs, missing = [np.array([vehicle.start])], ["start"], []  # type: list[np.ndarray], list[Leg], list[str]
+    here, left = np.array(vehicle.start), list(tracks)
+    while left:
+        nearest = [int(((t - here) ** 2).sum(axis=1).argmin()) for t in left]
+        lengths, ways = shortest_paths(road, here, np.array([t[n] for t, n in zip(left, nearest, strict=True)]))
+        chosen = int(lengths[0].argmin())
+        track, entry, way = left.pop(chosen), nearest[chosen], ways[0][chosen]
+        if way is None:
+            missing.append(f"{vehicle.id}: no way from its start to its region; move the start, or lessen its clearance")
+            continue
+        loop = _straightened(np.concatenate([track[entry:], track[:entry], track[entry : entry + 1]]))
+        points += [way[1:], loop[1:]]
+        legs.extend(["transit"] * (len(way) - 1))
+        legs.extend(["survey"] * (len(loop) - 1))
+        here = loop[-1]
+    way = shortest_paths(road, here, np.array(vehicle.home))[1][0][0]
+    if way is None:
+        missing.append(f"{vehicle.id}: no way from its region to its end; move the end, or lessen its clearance")
+    elif len(points) > 1 or vehicle.home != vehicle.start:
+        points.append(way[1:])
+        legs += ["transit"] * (len(way) - 1)
+    return np.concatenate(points), legs, missing
+
+
+def _straightened(line: np.ndarray) -> np.ndarray:
+    """Return an (n, 2) polyline without the points in the middle of its straight runs."""
+    pieces = straight_pieces(line)
+    return np.concatenate([pieces[:, 0], pieces[-1:, 1]])
+
+
+def survey_tracks(vehicle: Vehicle, route: Route) -> list[np.ndarray]:
+    """Return the (n, 2) lines in metres along which a route surveys, corners rounded as the vehicle drives them."""
+    xy, survey = route.xyz[:, :2], route.survey
+    starts = np.flatnonzero(survey & ~np.roll(survey, 1)) - 1
+    ends = np.flatnonzero(survey & ~np.roll(survey, -1))
+    return [driven(xy[a : b + 1], vehicle.turn_radius) for a, b in zip(starts, ends, strict=True)]
+
+
+def _launch_delay(vehicles: Sequence[Vehicle], index: int) -> float:
+    """Return seconds that a vehicle waits at its start, so that those beside it are clear before it leaves."""
+    own = vehicles[index]
+    room = 2 * (own.clearance + own.model.length)
+    ahead = [v for v in vehicles[:index] if v.domain == own.domain and np.hypot(*np.subtract(v.start, own.start)) < room]
+    return float(sum(2 * room / v.speed for v in ahead))
+
+
+def _with_takeoff(xyz: np.ndarray, legs: list[Leg]) -> tuple[np.ndarray, list[Leg]]:
+    """Put a climb at the start and a descent at the end of an aerial path; changes of altitude are made on the spot."""
+    rows: list[np.ndarray] = [np.array([*xyz[0, :2], 0.0])]
+    kinds: list[Leg] = ["start"]
+    for i, (row, leg) in enumerate(zip(xyz, legs, strict=True)):
+        if i == 0:
+            rows.append(np.array([*row[:2], xyz[min(1, len(xyz) - 1), 2]]))
+            kinds.append("takeoff")
+            continue
+        if row[2] != rows[-1][2]:
+            rows.append(np.array([*rows[-1][:2], row[2]]))
+            kinds.append("transit")
+        rows.append(row)
+        kinds.append(leg)
+    rows.append(np.array([*xyz[-1, :2], 0.0]))
+    kinds.append("landing")
+    return np.array(rows), kinds
