@@ -1,0 +1,1 @@
+"""Triage: UGVs search, a UAV relays, a medic treats."""

@@ -1,0 +1,110 @@
+"""The director's desk for one call: records taken out of memory, changed, commanded, logged, put back."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from math import hypot
+from typing import Any
+
+from quarterdeck.mission.director import Command, State
+from quarterdeck.mission.mission import Waypoint
+from quarterdeck.mission.triage.chase import Ways, expanding_square
+from quarterdeck.mission.triage.machines import Row, step
+from quarterdeck.mission.triage.records import XY, Entry, Medic, Memory, Record, Uav, Ugv
+from quarterdeck.mission.triage.settings import Policy, Settings
+from quarterdeck.mission.triage.team import Team
+
+_KIND: dict[type, str] = {Ugv: "ugv", Uav: "uav", Medic: "medic"}
+
+
+class Desk:
+    """One call of the director: `agents` are the records as they stand, `replanned` the medics with a new plan."""
+
+    __slots__ = ("agents", "commands", "log", "out", "policy", "replanned", "settings", "states", "tags", "team", "time")
+
+    def __init__(
+        self,
+        team: Team,
+        policy: Policy,
+        settings: Settings,
+        time: float,
+        states: Mapping[str, State],
+        memory: Memory | None,
+    ) -> None:
+        self.team, self.policy, self.settings, self.time, self.states = team, policy, settings, time, states
+        self.agents: dict[str, Any] = dict(memory.agents) if memory else {}
+        self.out, self.tags = (memory.out, memory.tags) if memory else (frozenset(), frozenset())
+        self.log: list[Entry] = list(memory.log) if memory else []
+        self.commands: dict[str, Command] = {}
+        self.replanned: set[str] = set()
+
+    def memory(self) -> Memory:
+        """Return what is to be kept until the next call."""
+        return Memory(self.agents, self.out, self.tags, tuple(self.log))
+
+    def change(self, name: str, **changes: Any) -> None:
+        """Put a changed record in the place of a member's record."""
+        self.agents[name] = replace(self.agents[name], **changes)
+
+    def fire(self, name: str, event: str) -> Row | None:
+        """Let a member's machine make the step of an event; its action is for the caller to do."""
+        record: Record = self.agents[name]
+        row = step(_KIND[type(record)], record.state, event)
+        if row is not None and row.next != record.state:
+            self.change(name, state=row.next)
+            self.note(name, "state", row.next, whom=event)
+        return row
+
+    def note(self, name: str, what: str, about: str = "", whom: str = "") -> None:
+        """Write a line of the log."""
+        here = self.states[name]
+        self.log.append(Entry(self.time, name, what, about, here.x, here.y, whom))
+
+    def here(self, name: str) -> XY:
+        """Return where a member is."""
+        state = self.states[name]
+        return state.x, state.y
+
+    def distance(self, a: str, b: str) -> float:
+        """Return the metres between two members, on the plan."""
+        one, other = self.states[a], self.states[b]
+        return hypot(one.x - other.x, one.y - other.y)
+
+    def send(self, name: str, waypoints: Iterable[Waypoint]) -> None:
+        """Command a member to do these waypoints from now on; none: stay."""
+        command = Command(tuple(waypoints))
+        self.commands[name] = command
+        self.change(name, moving=bool(command.waypoints))
+
+    def drive(self, name: str, corners: Iterable[XY], speed: float, hold: float = 0.0) -> None:
+        """Command a member through corners at a speed, and to wait `hold` seconds at the last."""
+        points = list(corners) or [self.here(name)]
+        z = self.states[name].z
+        last = len(points) - 1
+        self.send(
+            name, [Waypoint(x, y, z, speed=speed, hold=hold if i == last else 0.0) for i, (x, y) in enumerate(points)]
+        )
+
+    def search_field(self, name: str, speed: float) -> None:
+        """Command a member to search all the field for a medic, from where it is outwards."""
+        here = self.here(name)
+        area = self.team.air if isinstance(self.agents[name], Uav) else self.team.ground
+        self.drive(name, expanding_square(here, area, 1.8 * self.settings.talk, self.ways(name)), speed)
+
+    def lose(self, name: str, kind: str) -> None:
+        """A member stops for ever or, if it is a medic whose device fails, hears and tells nothing any more."""
+        self.note(name, "lost", kind)
+        if isinstance(self.agents[name], Medic) and kind == "mute":
+            self.change(name, mute=True)
+        else:
+            self.out |= {name}
+
+    def muted(self, name: str) -> bool:
+        """Return whether a member's device has failed."""
+        record = self.agents[name]
+        return isinstance(record, Medic) and record.mute
+
+    def ways(self, name: str) -> Ways:
+        """Return the shortest paths of a member."""
+        record = self.agents[name]
+        team = self.team
+        return team.on_ground if isinstance(record, Ugv) else team.in_air if isinstance(record, Uav) else team.on_foot

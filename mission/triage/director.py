@@ -1,0 +1,103 @@
+"""The triage director: what every UGV, UAV and medic does next (Weaver et al. 2025, Sec. V).
+
+A world reports what somebody sees, whom he meets, what is served, who is lost and who is idle. In the rooms `ugv`, `uav`
+and `medic` that becomes events of the machines in `machines`, whose rows say what is done and what comes next. A record of
+`records` is what one member knows; only `_talk` moves knowledge between two, and only when they are in range.
+"""
+
+from collections.abc import Mapping
+from itertools import combinations
+from typing import Any
+
+from quarterdeck.mission.director import Command, Director, Event, State
+from quarterdeck.mission.triage import medic, uav, ugv
+from quarterdeck.mission.triage.desk import Desk
+from quarterdeck.mission.triage.records import Belief, Medic, Memory, Report, Uav, Ugv
+from quarterdeck.mission.triage.settings import Policy, Settings
+from quarterdeck.mission.triage.team import Team
+
+_EDGE = 2e-6  # m: what the world calls a meeting is in range here, whatever the rounding
+
+
+def triage(team: Team, policy: Policy, settings: Settings) -> Director:
+    """Return the director of a team.
+
+    Its events: `seen` by a UGV or medic (subject the casualty; data `x`, `y`, `sort` and, for medics, `category`), `met`
+    (two in range), `served` (a medic's treatment is over), `lost` (data `kind`: stop, or mute: only the device failed).
+    """
+
+    def direct(
+        time: float, states: Mapping[str, State], events: tuple[Event, ...], memory: Memory | None
+    ) -> tuple[dict[str, Command], Any]:
+        desk = Desk(team, policy, settings, time, states, memory)
+        if memory is None:
+            _begin(desk)
+            return desk.commands, desk.memory()
+        for event in events:
+            _notice(desk, event)
+        for name in tuple(desk.agents):
+            if desk.agents[name].moving and states[name].idle and name not in desk.commands and name not in desk.out:
+                _ROOM[type(desk.agents[name])].arrived(desk, name)
+        _talk(desk)
+        return desk.commands, desk.memory()
+
+    return direct
+
+
+_ROOM = {Ugv: ugv, Uav: uav, Medic: medic}
+
+
+def _begin(desk: Desk) -> None:
+    """All know where the medics start, and that they have nothing to do yet."""
+    team, settings = desk.team, desk.settings
+    treat = settings.treat["red"]
+    beliefs = {m: Belief(0.0, *xy, settings.medic_speed, treat) for m, xy in team.medics.items()}
+    for name in team.ugvs:
+        desk.agents[name] = Ugv(beliefs=beliefs)
+        ugv.resume(desk, name)
+    for name in team.uavs:
+        desk.agents[name] = Uav(beliefs=beliefs, visits={u: (0.0, 0, r.start) for u, r in team.ugvs.items()}, misses={})
+        uav.go_home(desk, name)
+    for name, xy in team.medics.items():
+        desk.agents[name] = Medic(last=xy)
+
+
+def _notice(desk: Desk, event: Event) -> None:
+    """Turn what a world reports into what its observer knows."""
+    if event.kind == "lost":
+        desk.lose(event.vehicle, event.data.get("kind", "stop"))
+    elif event.vehicle in desk.out:
+        return
+    elif event.kind == "seen" and event.subject not in desk.tags:
+        record = desk.agents[event.vehicle]
+        report = Report(event.subject, event.data["x"], event.data["y"], event.data["sort"], event.vehicle, desk.time)
+        if isinstance(record, Medic):
+            medic.saw(desk, event.vehicle, report, event.data["category"])
+        elif isinstance(record, Ugv):
+            ugv.saw(desk, event.vehicle, report)
+    elif event.kind == "served" and isinstance(desk.agents[event.vehicle], Medic):
+        medic.treated(desk, event.vehicle, event.subject)
+
+
+def _talk(desk: Desk) -> None:
+    """Let all who are in range exchange what they have to, until nobody has anything new."""
+    reach = float("inf") if desk.policy.everywhere else desk.settings.talk + _EDGE
+    able = [n for n in desk.agents if n not in desk.out and not desk.muted(n)]
+    pairs = [(a, b) for a, b in combinations(able, 2) if desk.distance(a, b) <= reach]
+    pending = bool(pairs)
+    while pending:
+        pending = False
+        for a, b in pairs:  # UGVs come before UAVs, UAVs before medics
+            one, other = desk.agents[a], desk.agents[b]
+            if isinstance(one, Ugv) and isinstance(other, Uav):
+                pending |= ugv.meets_uav(desk, a, b)
+            elif isinstance(one, Ugv) and isinstance(other, Medic):
+                pending |= ugv.meets_medic(desk, a, b)
+            elif isinstance(one, Uav) and isinstance(other, Medic):
+                pending |= uav.meets_medic(desk, a, b)
+            elif isinstance(one, Uav) and isinstance(other, Uav):
+                uav.meets_uav(desk, a, b)
+            elif isinstance(one, Medic) and isinstance(other, Medic):
+                medic.meets_medic(desk, a, b)
+    if desk.replanned and desk.policy.receiver == "medic" and desk.settings.knows_medic:
+        ugv.aim_again(desk)

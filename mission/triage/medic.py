@@ -1,0 +1,136 @@
+"""The medic: idle, plan, go, treat (Fig. 5). His queue is planned anew at every new casualty, in the method's order."""
+
+import numpy as np
+
+from quarterdeck.mission.mission import Waypoint
+from quarterdeck.mission.priority_tsp import priority_order
+from quarterdeck.mission.triage.desk import Desk
+from quarterdeck.mission.triage.records import Belief, Medic, Report
+from quarterdeck.mission.triage.settings import RANK
+
+
+def saw(desk: Desk, name: str, report: Report, category: str) -> None:
+    """He sees a casualty: he sorts it as a robot would and, close as he is, knows its category."""
+    me: Medic = desk.agents[name]
+    desk.change(name, examined={**(me.examined or {}), report.id: category})
+    if report.id not in me.known:
+        desk.note(name, "found", report.id)
+        learn(desk, name, (report,))
+
+
+def learn(desk: Desk, name: str, reports: tuple[Report, ...]) -> None:
+    """He takes new casualties into his queue and plans; while he treats, for afterwards."""
+    me: Medic = desk.agents[name]
+    new = tuple({r.id: r for r in reports if r.id not in me.known and r.id not in me.treated}.values())
+    if not new:
+        return
+    desk.change(name, queue=me.queue + new, known=me.known | {r.id for r in new})
+    row = desk.fire(name, "casualty learnt")
+    if row is not None:
+        _plan(desk, name)
+
+
+def treated(desk: Desk, name: str, casualty: str) -> None:
+    """A treatment is over."""
+    me: Medic = desk.agents[name]
+    desk.note(name, "treated", casualty, whom=_category(me, casualty))
+    green = _category(me, casualty) == "green" and me.helpers < desk.settings.helpers
+    desk.change(name, treated=(*me.treated, casualty), moving=False, helpers=me.helpers + green)
+    desk.fire(name, "treated")
+    _strike_off(desk, name, casualty)
+
+
+def arrived(desk: Desk, name: str) -> None:
+    """He stands at the casualty: somebody else may have treated it, which he sees; else he begins."""
+    me: Medic = desk.agents[name]
+    if me.state != "go":
+        return
+    report = me.queue[0]
+    if report.id in desk.tags:
+        desk.fire(name, "arrived, already treated")
+        _strike_off(desk, name, report.id)
+        return
+    desk.fire(name, "arrived")
+    seconds = desk.settings.treat[_category(me, report.id)] / (1.0 + desk.settings.help_gain * me.helpers)
+    desk.tags |= {report.id}
+    desk.note(name, "treatment", report.id)
+    desk.change(name, treat_until=desk.time + seconds, heading_for="")
+    x, y = desk.here(name)
+    desk.send(name, [Waypoint(x, y, hold=seconds, task=report.id)])
+
+
+def meets_medic(desk: Desk, one: str, other: str) -> None:
+    """Two medics tell each other whom they have treated, and what each will do, so that none walks for nothing."""
+    a, b = desk.agents[one], desk.agents[other]
+    for name, me, them in ((one, a, b), (other, b, a)):
+        over = {*them.treated, *([them.queue[0].id] if them.state == "treat" else [])}
+        busy = me.queue[0].id if me.state in ("go", "treat") and me.queue else ""
+        if drop := {r.id for r in me.queue if r.id in over and r.id != busy}:
+            desk.change(name, queue=tuple(r for r in me.queue if r.id not in drop))
+            _plan(desk, name)
+
+
+def belief(desk: Desk, name: str) -> Belief:
+    """Return what one knows who meets the medic now and is shown his queue."""
+    me: Medic = desk.agents[name]
+    treating = me.state == "treat"
+    stops = tuple((r.x, r.y, RANK[r.sort]) for r in (me.queue[1:] if treating else me.queue))
+    busy = max(0.0, me.treat_until - desk.time) if treating else 0.0
+    seconds = desk.settings.treat["red"] / (1.0 + desk.settings.help_gain * me.helpers)
+    return Belief(desk.time, *desk.here(name), _speed(desk, me), seconds, busy, stops)
+
+
+def _category(me: Medic, casualty: str) -> str:
+    return (me.examined or {}).get(casualty, "red")
+
+
+def _speed(desk: Desk, me: Medic) -> float:
+    return desk.settings.medic_speed * max(0.5, 1.0 - desk.settings.fatigue * me.walked / 100.0)
+
+
+def _strike_off(desk: Desk, name: str, casualty: str) -> None:
+    me: Medic = desk.agents[name]
+    desk.change(name, queue=tuple(r for r in me.queue if r.id != casualty), heading_for="")
+    _plan(desk, name)
+
+
+def _plan(desk: Desk, name: str) -> None:
+    """Put the queue in order and, unless he is treating, walk to the first."""
+    me: Medic = desk.agents[name]
+    treating = me.state == "treat"
+    head, rest = (me.queue[:1], me.queue[1:]) if treating else ((), me.queue)
+    queue = head + _in_order(desk, name, rest)
+    desk.change(name, queue=queue)
+    desk.replanned.add(name)
+    if treating:
+        return
+    if not queue:
+        if desk.fire(name, "nothing left"):
+            desk.send(name, ())
+        return
+    desk.fire(name, "path planned")
+    if queue[0].id == me.heading_for:
+        return
+    here = desk.here(name)
+    walked = me.walked + ((here[0] - me.last[0]) ** 2 + (here[1] - me.last[1]) ** 2) ** 0.5
+    desk.change(name, heading_for=queue[0].id, walked=walked, last=here)
+    corners = desk.team.on_foot(here, (queue[0].x, queue[0].y))
+    desk.drive(name, corners, _speed(desk, desk.agents[name]))
+
+
+def _in_order(desk: Desk, name: str, reports: tuple[Report, ...]) -> tuple[Report, ...]:
+    """Return the reports as the method's medic would take them from where he is."""
+    order = desk.settings.order or desk.policy.order
+    if len(reports) < 2 or order == "first-come":
+        return reports
+    points = np.array([desk.here(name), *((r.x, r.y) for r in reports)])
+    distance = desk.team.distances(points)
+    if order == "priority":
+        ranks = np.array([RANK[r.sort] for r in reports])
+        return tuple(reports[i] for i in priority_order(distance, ranks).order)
+    at, left, chosen = 0, list(range(1, len(points))), []
+    while left:
+        at = min(left, key=lambda j: (distance[at, j], j))
+        left.remove(at)
+        chosen.append(reports[at - 1])
+    return tuple(chosen)

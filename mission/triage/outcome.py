@@ -1,0 +1,165 @@
+"""One triage mission in the fast world, and what became of every casualty."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.scenario import Scenario
+from quarterdeck.mission.triage.director import triage
+from quarterdeck.mission.triage.records import Entry, Memory
+from quarterdeck.mission.triage.settings import METHODS, Settings
+from quarterdeck.mission.triage.team import Team, make_team, targets
+from quarterdeck.mission.world import Fault, Run, run_world
+
+
+@dataclass(frozen=True, slots=True)
+class Fate:
+    """What became of a casualty. Times in seconds from the mission's start, None where it did not happen.
+
+    `sort` is what the robots took it for, `category` what the medic confirmed; `reported` is when a UAV or medic was first
+    told or a medic saw it, `delivered` when a medic knew, `reached` when his treatment began. `undeliverable`: told so.
+    """
+
+    id: str
+    x: float
+    y: float
+    colour: str
+    sort: str | None = None
+    category: str | None = None
+    found: float | None = None
+    found_by: str | None = None
+    reported: float | None = None
+    reported_by: str | None = None
+    delivered: float | None = None
+    delivered_by: str | None = None
+    reached: float | None = None
+    treated: float | None = None
+    treated_by: str | None = None
+    undeliverable: bool = False
+
+    @property
+    def state(self) -> str:
+        """One word for where it stands at the end."""
+        if self.treated is not None:
+            return "treated"
+        if self.undeliverable:
+            return "undeliverable"
+        return "delivered" if self.delivered is not None else "found" if self.found is not None else "not found"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """A mission that has been run. `end` is when the last casualty was treated or the last UGV finished its search.
+
+    `reasons` say, one line each, what could not be done; there are none if all was searched, found and treated.
+    """
+
+    scenario: Scenario
+    method: str
+    settings: Settings
+    seed: int
+    team: Team
+    fates: tuple[Fate, ...]
+    log: tuple[Entry, ...]
+    run: Run
+    end: float
+    reasons: tuple[str, ...]
+
+
+def run_triage(
+    scenario: Scenario,
+    method: str = "relay",
+    settings: Settings | None = None,
+    *,
+    seed: int = 0,
+    faults: Sequence[Fault] = (),
+) -> Outcome:
+    """Run a method on a scenario in the fast world and return what became of every casualty.
+
+    `seed` decides only what robots sort wrongly, where their `confidence` is below 1. Raises InputError as `make_team`
+    does, or if a fault names nobody of the team.
+    """
+    settings = settings or Settings()
+    team = make_team(scenario, method, settings)
+    names = [*team.ugvs, *team.uavs, *team.medics]
+    for fault in faults:
+        known = {*names, *(v.id for v in scenario.vehicles)}
+        if fault.actor not in known:
+            raise InputError(f"--fail {fault.actor}: nobody has this name; use one of {', '.join(sorted(known))}")
+    faults = [Fault(f.actor, f.time, "mute" if f.actor in team.medics else f.kind) for f in faults if f.actor in names]
+    policy = METHODS[method]
+    actors = team.actors(settings)
+    robots = len(team.ugvs)
+    pairs = [(i, j) for i, j in combinations(range(len(actors)), 2) if j >= robots]  # UGVs have nothing to tell each other
+    seen = targets(scenario, settings, seed)
+    reach = float("inf") if policy.everywhere else settings.talk
+    run = run_world(triage(team, policy, settings), actors, seen, pairs, reach, faults=faults)
+    memory: Memory = run.memory
+    fates = _fates(scenario, memory.log, {t.id: t.data for t in seen})
+    searched = [e.time for e in memory.log if e.what == "state" and e.whom == "section searched"]
+    end = max([0.0, *searched, *(f.treated for f in fates if f.treated is not None)])
+    return Outcome(scenario, method, settings, seed, team, fates, memory.log, run, end, _reasons(team, fates, memory, run))
+
+
+def _fates(scenario: Scenario, log: Sequence[Entry], data: Mapping[str, Mapping[str, str]]) -> tuple[Fate, ...]:
+    first: dict[tuple[str, str], Entry] = {}
+    for entry in log:
+        first.setdefault((entry.what, entry.about), entry)
+    medics = {m for m, _ in scenario.medics}
+    fates = []
+    for c in scenario.casualties:
+        found, handed, delivered, treatment, treated = (
+            first.get((what, c.id)) for what in ("found", "handed", "delivered", "treatment", "treated")
+        )
+        own = next((e for e in log if e.what == "found" and e.about == c.id and e.who in medics), None)
+        told = min((e for e in (delivered, own) if e), key=lambda e: e.time, default=None)
+        reported = min((e for e in (handed, delivered, own) if e), key=lambda e: e.time, default=None)
+        fates.append(
+            Fate(
+                c.id,
+                *c.position,
+                colour=c.colour,
+                sort=data[c.id]["sort"] if found else None,
+                category=treated.whom if treated else None,
+                found=found.time if found else None,
+                found_by=found.who if found else None,
+                reported=reported.time if reported else None,
+                reported_by=reported.who if reported else None,
+                delivered=told.time if told else None,
+                delivered_by=told.who if told else None,
+                reached=treatment.time if treatment else None,
+                treated=treated.time if treated else None,
+                treated_by=treated.who if treated else None,
+                undeliverable=told is None and ("undeliverable", c.id) in first,
+            )
+        )
+    return tuple(fates)
+
+
+def _reasons(team: Team, fates: Sequence[Fate], memory: Memory, run: Run) -> tuple[str, ...]:
+    reasons = [run.reason] if run.reason else []
+    reasons += [
+        f"{name} stopped before its section was searched"
+        for name in team.ugvs
+        if name in memory.out and not getattr(memory.agents[name], "searched", True)
+    ]
+    if team.search.missed > 0:
+        reasons.append(f"{team.search.missed:,.0f} m2 of the field cannot be seen from where the UGVs can go")
+    for fate in fates:
+        if fate.state == "not found":
+            reasons.append(f"casualty {fate.id} ({fate.colour}) was not found")
+        elif fate.state == "found":
+            reasons.append(f"casualty {fate.id} ({fate.colour}) was found by {fate.found_by}, who told nobody")
+        elif fate.state == "undeliverable":
+            reasons.append(f"casualty {fate.id} ({fate.colour}) could not be told to any medic")
+        elif fate.state == "delivered":
+            reasons.append(f"casualty {fate.id} ({fate.colour}) was not treated")
+    return tuple(reasons)
+
+
+def track_at(track: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return (m, 2) positions on a track (n, 3) at (m,) times."""
+    return np.column_stack([np.interp(times, track[:, 0], track[:, 1]), np.interp(times, track[:, 0], track[:, 2])])

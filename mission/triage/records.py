@@ -1,0 +1,124 @@
+"""What each member of the team knows: the director's memory. Nothing passes between two records but in range."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+XY = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A casualty as seen: `sort` is the colour that the sight gives (red, yellow, green), `by` and `at` who and when."""
+
+    id: str
+    x: float
+    y: float
+    sort: str
+    by: str
+    at: float
+
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """What somebody believes of a medic: at `time` he was at (`x`, `y`), busy for `busy` s, then walks through `stops`.
+
+    A stop is (x, y, rank); he walks at `speed` and treats `treat` seconds at each.
+    """
+
+    time: float
+    x: float
+    y: float
+    speed: float
+    treat: float
+    busy: float = 0.0
+    stops: tuple[tuple[float, float, int], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Ugv:
+    """`reports` no medic is known to have yet; `told`: those of them told undeliverable; `around`: urgent, not visited yet.
+
+    `rest` is the first waypoint of its search path not reached when it left the path at `left`; `gathered` counts N.
+    """
+
+    state: str = "explore"
+    moving: bool = False
+    reports: tuple[Report, ...] = ()
+    told: frozenset[str] = frozenset()
+    known: frozenset[str] = frozenset()
+    around: tuple[Report, ...] = ()
+    gathered: int = 0
+    rest: int = 0
+    left: XY | None = None
+    searched: bool = False
+    relay_lost: bool = False
+    sweeps: int = 0
+    unreachable: frozenset[str] = frozenset()
+    beliefs: Mapping[str, Belief] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Uav:
+    """`load`: (report, medic it is meant for). `closed`: ids that a medic has. `home` is the index of its rendezvous.
+
+    `target` is the medic or, in a round robin, the UGV it flies to; `seen_ugvs` where each UGV was on its path, and when.
+    """
+
+    state: str = "return"
+    moving: bool = False
+    load: tuple[tuple[Report, str], ...] = ()
+    closed: frozenset[str] = frozenset()
+    told: frozenset[str] = frozenset()
+    target: str = ""
+    sweeps: int = 0
+    unreachable: frozenset[str] = frozenset()
+    beliefs: Mapping[str, Belief] | None = None
+    visits: Mapping[str, tuple[float, int, XY]] | None = None
+    misses: Mapping[str, int] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Medic:
+    """`queue` in the order of treatment, the first being walked to or treated, in treatment until `treat_until`.
+
+    `examined` is the category of whom he has seen, `walked` metres since the start, `last` where he last set out.
+    """
+
+    state: str = "idle"
+    moving: bool = False
+    mute: bool = False
+    queue: tuple[Report, ...] = ()
+    known: frozenset[str] = frozenset()
+    treated: tuple[str, ...] = ()
+    heading_for: str = ""
+    treat_until: float = 0.0
+    helpers: int = 0
+    walked: float = 0.0
+    last: XY = (0.0, 0.0)
+    examined: Mapping[str, str] | None = None
+
+
+Record = Ugv | Uav | Medic
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A line of the log. `what`: found, handed, delivered, treatment, treated, undeliverable, lost, state, plan."""
+
+    time: float
+    who: str
+    what: str
+    about: str
+    x: float
+    y: float
+    whom: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """All that the director keeps: records by id, `tags` on casualties in treatment or treated (seen on the spot), log."""
+
+    agents: Mapping[str, Record]
+    out: frozenset[str] = frozenset()
+    tags: frozenset[str] = frozenset()
+    log: tuple[Entry, ...] = ()

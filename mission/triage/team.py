@@ -1,0 +1,207 @@
+"""The team at work: what is fixed before the mission starts, made from a scenario and checked once."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from shapely import MultiPolygon, Point
+
+from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.scenario import Scenario, as_multipolygon
+from quarterdeck.geo.transit import roadmap, shortest_path
+from quarterdeck.mission.mission import Waypoint
+from quarterdeck.mission.triage.chase import Ways, straight
+from quarterdeck.mission.triage.records import XY
+from quarterdeck.mission.triage.search import Search, search_paths
+from quarterdeck.mission.triage.settings import METHODS, SORT, Colour, Settings
+from quarterdeck.mission.world import Actor, Target
+
+_MOVES = 30.0  # s between two places of a moving rendezvous
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """A UGV or UAV: `path` is what a UGV searches; `home` when a UAV is where, as (seconds, (x, y)), first to last."""
+
+    id: str
+    start: XY
+    speed: float
+    sees: float
+    z: float = 0.0
+    path: tuple[Waypoint, ...] = ()
+    home: tuple[tuple[float, XY], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Team:
+    """Who works on a site, and how they get about. `medics` are starts by id; `ground` and `air` are where
+    UGVs and UAVs may be.
+
+    `distances` gives the medics' (n, n) metres between (n, 2) points; `on_ground`, `on_foot` and `in_air` shortest paths.
+    """
+
+    ugvs: Mapping[str, Robot]
+    uavs: Mapping[str, Robot]
+    medics: Mapping[str, XY]
+    search: Search
+    ground: MultiPolygon
+    air: MultiPolygon
+    on_ground: Ways
+    on_foot: Ways
+    in_air: Ways
+    distances: Callable[[np.ndarray], np.ndarray]
+
+    def actors(self, settings: Settings) -> list[Actor]:
+        """Return everybody for the world: UGVs, UAVs, medics."""
+        on_the_spot = max(settings.medic_sees, 0.1)
+        return [
+            *(Actor(u.id, *u.start, speed=u.speed, sees=u.sees) for u in self.ugvs.values()),
+            *(Actor(u.id, *u.start, z=u.z, speed=u.speed) for u in self.uavs.values()),
+            *(Actor(m, *xy, speed=settings.medic_speed, sees=on_the_spot) for m, xy in self.medics.items()),
+        ]
+
+
+def make_team(scenario: Scenario, method: str, settings: Settings) -> Team:
+    """Return the team of a scenario for a method.
+
+    Raises InputError, in one line, if there is no UGV or medic, no UAV for a method that needs one, or a casualty, medic or
+    rendezvous is where nobody can get.
+    """
+    if method not in METHODS:
+        raise InputError(f"unknown method {method!r}; use one of {', '.join(METHODS)}")
+    policy = METHODS[method]
+    ugvs = [v for v in scenario.vehicles if v.domain == "ground"]
+    uavs = [v for v in scenario.vehicles if v.domain == "aerial"]
+    if not ugvs:
+        raise InputError('no UGV to search with; add a vehicle with "domain": "ground"')
+    if not scenario.medics:
+        raise InputError('no medic; add a Point with "role": "medic"')
+    if not scenario.site.areas:
+        raise InputError('no field to search; give the polygon to be searched "role": "area"')
+    if policy.receiver == "uav" and not uavs:
+        raise InputError(f'method {method} needs a UAV; add a vehicle with "domain": "aerial", or use --method no-relay')
+    clearance = max(u.clearance for u in ugvs)
+    ground = scenario.site.navigable("ground", clearance)
+    on_ground, on_foot = ways_in(ground), ways_in(scenario.site.navigable("ground"))
+    in_air = ways_in(scenario.site.navigable("aerial"))
+    _check_places(scenario)
+    spacing = scenario.spacing or settings.spacing
+    sees = [u.range or settings.ugv_sees for u in ugvs]
+    field = as_multipolygon(scenario.site.area.intersection(scenario.site.navigable("ground")))
+    starts = tuple((float(u.start[0]), float(u.start[1])) for u in ugvs)
+    search = search_paths(field, ground, starts, spacing, min(sees), on_ground)
+    points = _rendezvous(scenario, search) if policy.receiver == "uav" else ()
+    routes = [tuple(Waypoint(float(x), float(y), leg="survey", speed=u.speed) for x, y in p)
+              for u, p in zip(ugvs, search.paths, strict=True)]  # fmt: skip
+    robots = {u.id: Robot(u.id, u.start, u.speed, s, path=r) for u, s, r in zip(ugvs, sees, routes, strict=True)}
+    homes: list[tuple[tuple[float, XY], ...]] = [
+        ((0.0, points[i % len(points)]),) for i in range(len(uavs) if points else 0)
+    ]
+    if settings.rendezvous == "moving" and points:
+        homes = [_moving(robots, ground) or homes[0]] * len(uavs)
+    used = uavs if policy.receiver == "uav" else []
+    return Team(
+        ugvs=robots,
+        uavs={u.id: Robot(u.id, u.start, u.speed, 0.0, u.altitude, home=h) for u, h in zip(used, homes, strict=True)},
+        medics=dict(scenario.medics),
+        search=search,
+        ground=ground,
+        air=scenario.site.navigable("aerial"),
+        on_ground=on_ground,
+        on_foot=on_foot,
+        in_air=in_air,
+        distances=_distances(on_foot),
+    )
+
+
+def targets(scenario: Scenario, settings: Settings, seed: int) -> list[Target]:
+    """Return the casualties: robots see `sort`, wrong with probability 1 - confidence; medics see `category`."""
+    rng = np.random.default_rng([seed, 0x5A17])
+    sorts: tuple[Colour, ...] = ("red", "yellow", "green")
+    made = []
+    for c in scenario.casualties:
+        wrong, other = rng.random() >= settings.confidence, int(rng.integers(1, 3))
+        sort = SORT[c.colour]
+        seen = sorts[(sorts.index(sort) + other) % 3] if wrong else sort
+        made.append(Target(c.id, *c.position, {"sort": seen, "category": c.colour}))
+    return made
+
+
+@lru_cache(maxsize=64)
+def ways_in(polygon: MultiPolygon) -> Ways:
+    """Return the shortest paths in a polygon; straight lines where it is convex."""
+    if len(polygon.geoms) == 1 and polygon.convex_hull.area - polygon.area < 1e-6 * polygon.area:
+        return straight
+    road = roadmap(polygon)
+
+    @lru_cache(maxsize=100_000)
+    def ways(a: XY, b: XY) -> Sequence[XY]:
+        path = shortest_path(road, a, b)
+        if path is None:
+            raise InputError(f"no way from ({a[0]:.1f}, {a[1]:.1f}) to ({b[0]:.1f}, {b[1]:.1f}) m around the obstacles")
+        return tuple((float(x), float(y)) for x, y in path[1:])
+
+    return ways
+
+
+@lru_cache(maxsize=64)
+def _distances(ways: Ways) -> Callable[[np.ndarray], np.ndarray]:
+    def straight_distances(points: np.ndarray) -> np.ndarray:
+        dx = points[:, None, :] - points[None, :, :]
+        return np.hypot(dx[..., 0], dx[..., 1])
+
+    @lru_cache(maxsize=100_000)
+    def distance(a: XY, b: XY) -> float:
+        path = np.array([a, *ways(a, b)])
+        return float(np.hypot(*np.diff(path, axis=0).T).sum())
+
+    def around(points: np.ndarray) -> np.ndarray:
+        xy = [(float(x), float(y)) for x, y in points]
+        matrix = np.zeros((len(xy), len(xy)))
+        for i in range(len(xy)):
+            for j in range(i):
+                matrix[i, j] = matrix[j, i] = distance(*sorted((xy[i], xy[j])))
+        return matrix
+
+    return straight_distances if ways is straight else around
+
+
+def _check_places(scenario: Scenario) -> None:
+    operating = scenario.site.operating
+    foot = scenario.site.navigable("ground")
+    for kind, named in (("medic", scenario.medics), ("rendezvous", scenario.rendezvous)):
+        for name, xy in named:
+            if not operating.covers(Point(xy)):
+                away = operating.distance(Point(xy))
+                raise InputError(f"{kind} {name!r} is {away:,.1f} m outside the field; move it in")
+            if not foot.buffer(1e-6).covers(Point(xy)):
+                raise InputError(f"{kind} {name!r} is inside an obstacle; move it out")
+    for c in scenario.casualties:
+        if not foot.buffer(1e-6).covers(Point(c.position)):
+            inside = [o.id for o in scenario.site.obstacles if o.polygon.covers(Point(c.position))]
+            where = f"inside obstacle {inside[0]!r}" if inside else "outside the field"
+            raise InputError(f"casualty {c.id!r} is {where}, where no medic can get; move it, or the outline")
+
+
+def _rendezvous(scenario: Scenario, search: Search) -> tuple[XY, ...]:
+    """Return the given points or, if none, the place from which the search paths are nearest on average."""
+    if scenario.rendezvous:
+        return tuple(xy for _, xy in scenario.rendezvous)
+    centre = Point(*np.concatenate(search.paths).mean(axis=0))
+    free = scenario.site.navigable("ground")
+    near = centre if free.covers(centre) else free.boundary.interpolate(free.boundary.project(centre))
+    return ((near.x, near.y),)
+
+
+def _moving(ugvs: Mapping[str, Robot], free: MultiPolygon) -> tuple[tuple[float, XY], ...]:
+    """Return the middle of where the UGVs would be without finds, every half minute: all robots can work it out."""
+    courses = []
+    for u in ugvs.values():
+        xy = np.array([u.start, *((w.x, w.y) for w in u.path)])
+        courses.append((np.concatenate([[0.0], np.hypot(*np.diff(xy, axis=0).T).cumsum() / u.speed]), xy))
+    end = max(t[-1] for t, _ in courses)
+    times = np.arange(0.0, end + _MOVES, _MOVES)
+    middle = np.mean([np.column_stack([np.interp(times, t, xy[:, i]) for i in (0, 1)]) for t, xy in courses], axis=0)
+    inside = [free.covers(Point(p)) for p in middle]  # where the middle is in an obstacle, the last place is kept
+    return tuple((float(t), (float(x), float(y))) for t, (x, y), ok in zip(times, middle, inside, strict=True) if ok)

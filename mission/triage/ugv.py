@@ -1,0 +1,249 @@
+"""The UGV: explore, continued explore, deliver, wait, return (Fig. 3); seek, when the UAV does not come."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+from quarterdeck.mission.triage import medic, uav
+from quarterdeck.mission.triage.chase import chase, meeting_time, predict
+from quarterdeck.mission.triage.desk import Desk
+from quarterdeck.mission.triage.records import XY, Report, Uav, Ugv
+
+_REPORTING = ("deliver", "wait", "seek")
+
+
+def saw(desk: Desk, name: str, report: Report) -> None:
+    """It sees a casualty: noted if new; an urgent one makes it look around there, up to N of them, and report."""
+    me: Ugv = desk.agents[name]
+    if report.id in me.known:
+        return
+    desk.note(name, "found", report.id)
+    desk.change(name, known=me.known | {report.id}, reports=(*me.reports, report))
+    urgent = report.sort in desk.policy.urgent and desk.settings.rendezvous != "round-robin"
+    if not urgent or me.state not in ("explore", "continued explore", "return"):
+        desk.fire(name, "casualty seen")
+        return
+    if me.state == "continued explore":
+        desk.change(name, around=(*me.around, report), gathered=me.gathered + 1)
+        if me.gathered + 1 < desk.settings.clusters:
+            desk.fire(name, "urgent casualty seen")
+        elif desk.fire(name, "N urgent ones gathered"):
+            _report(desk, name)
+        return
+    if me.state == "explore":
+        desk.change(name, left=desk.here(name), rest=me.rest + desk.states[name].reached)
+    desk.change(name, around=(), gathered=1)
+    if desk.settings.clusters == 1:  # nothing to look for: the first is the last
+        desk.fire(name, "urgent casualty seen")
+        desk.fire(name, "N urgent ones gathered")
+        _report(desk, name)
+    elif desk.fire(name, "urgent casualty seen"):
+        _drive_to(desk, name, (report.x, report.y))
+
+
+def arrived(desk: Desk, name: str) -> None:
+    """It has come to the end of what it was told to drive."""
+    me: Ugv = desk.agents[name]
+    if me.state == "explore":
+        desk.change(name, searched=True, left=desk.here(name), rest=len(desk.team.ugvs[name].path))
+        if desk.fire(name, "section searched"):
+            _report(desk, name)
+    elif me.state == "return":
+        if desk.fire(name, "back where it left"):
+            resume(desk, name)
+    elif me.state == "continued explore" and me.around:
+        last = me.around[-1]
+        desk.change(name, around=())
+        desk.fire(name, "centre reached, urgent ones left")
+        _drive_to(desk, name, (last.x, last.y))
+    elif me.state == "continued explore":
+        if desk.fire(name, "centre reached, none left"):
+            _report(desk, name)
+    elif me.state == "deliver":
+        if desk.fire(name, "nobody there"):
+            _wait(desk, name)
+    elif me.state == "wait":
+        desk.change(name, relay_lost=desk.policy.receiver == "uav", sweeps=0)
+        if desk.fire(name, "patience over"):
+            _look_for_medic(desk, name)
+    elif me.state == "seek":
+        if me.sweeps < desk.settings.sweeps:
+            desk.fire(name, "not found")
+            desk.change(name, sweeps=me.sweeps + 1)
+            desk.search_field(name, desk.team.ugvs[name].speed)
+        else:
+            desk.change(name, unreachable=me.unreachable | set(desk.team.medics))
+            _give_up(desk, name)
+
+
+def meets_uav(desk: Desk, name: str, other: str) -> bool:
+    """Hand over to a UAV and hear from it what the medics have. Return whether anything was said."""
+    me: Ugv = desk.agents[name]
+    it: Uav = desk.agents[other]
+    passing = desk.settings.rendezvous == "round-robin"
+    if desk.policy.receiver != "uav" or (me.state not in _REPORTING and not passing):
+        return False
+    carried = it.closed | it.told | {r.id for r, _ in it.load}
+    news = tuple(r for r in me.reports if r.id not in carried)
+    left = tuple(r for r in me.reports if r.id not in it.closed)
+    told = me.told | (it.told & {r.id for r in left})
+    desk.change(
+        name,
+        reports=left,
+        told=told,
+        known=me.known | it.closed,
+        relay_lost=False,
+        beliefs=uav.fresher(dict(me.beliefs or {}), dict(it.beliefs or {})),
+    )
+    over = me.searched and not [r for r in left if r.id not in told]
+    visits = {**(it.visits or {}), name: (desk.time, -1 if over else _index(desk, name), desk.here(name))}
+    desk.change(other, visits=visits)
+    for r in news:
+        desk.note(name, "handed", r.id, whom=other)
+    said = bool(news)
+    if news:
+        uav.receive(desk, other, news)
+    elif passing and it.target == name and it.state != "deliver":
+        desk.change(other, target="", misses={**(it.misses or {}), name: 0})
+        uav.go_home(desk, other)
+        said = True
+    return _after_handing(desk, name, said=said) or said
+
+
+def meets_medic(desk: Desk, name: str, other: str) -> bool:
+    """Report to a medic himself: without a relay, or when the relay is lost. Return whether anything was said."""
+    me: Ugv = desk.agents[name]
+    direct = desk.policy.receiver == "medic" and (me.state in _REPORTING or desk.policy.everywhere)
+    if not direct and not (me.relay_lost and me.state in _REPORTING):
+        return False
+    for r in me.reports:
+        desk.note(name, "delivered", r.id, whom=other)
+    medic.learn(desk, other, me.reports)
+    beliefs = {**(me.beliefs or {}), other: medic.belief(desk, other)}
+    desk.change(name, reports=(), told=frozenset(), known=me.known | desk.agents[other].known, beliefs=beliefs)
+    return _after_handing(desk, name, said=bool(me.reports)) or bool(me.reports)
+
+
+def aim_again(desk: Desk) -> None:
+    """A medic has changed his plan: UGVs who know where he is and drive to him change course."""
+    for name, record in desk.agents.items():
+        if isinstance(record, Ugv) and record.state == "deliver" and record.moving and name not in desk.out:
+            _look_for_medic(desk, name)
+
+
+def resume(desk: Desk, name: str) -> None:
+    """Search on along the path from the first waypoint not reached."""
+    me: Ugv = desk.agents[name]
+    path = desk.team.ugvs[name].path[me.rest :]
+    if path:
+        desk.send(name, path)
+    else:
+        _drive(desk, name, [desk.here(name)])
+
+
+def _after_handing(desk: Desk, name: str, *, said: bool) -> bool:
+    """Go back to the path or, when it is searched, wait for the receipt of all that was handed over."""
+    me: Ugv = desk.agents[name]
+    if me.state not in _REPORTING:
+        return False
+    if not me.searched:
+        desk.fire(name, "handed over")
+        _back(desk, name)
+        return True
+    if all(r.id in me.told for r in me.reports):
+        desk.fire(name, "receipt in hand")
+        desk.send(name, ())
+        return True
+    if me.state != "wait" or said:
+        desk.fire(name, "handed over, receipt due")
+        _wait(desk, name)
+        return True
+    return False
+
+
+def _index(desk: Desk, name: str) -> int:
+    me: Ugv = desk.agents[name]
+    return me.rest + desk.states[name].reached if me.state == "explore" and name not in desk.commands else me.rest
+
+
+def _report(desk: Desk, name: str) -> None:
+    """Go to whom it reports: the rendezvous, or a medic; in a round robin wait to be visited."""
+    me: Ugv = desk.agents[name]
+    desk.change(name, around=(), gathered=0, sweeps=0)
+    if desk.policy.receiver == "medic" or me.relay_lost:
+        if me.unreachable >= set(desk.team.medics):
+            _give_up(desk, name)
+        else:
+            _look_for_medic(desk, name)
+    elif desk.settings.rendezvous == "round-robin":
+        _drive(desk, name, [desk.here(name)])
+    else:
+        _drive(desk, name, _to_rendezvous(desk, name))
+
+
+def _to_rendezvous(desk: Desk, name: str) -> list[XY]:
+    """Return the way to the nearest rendezvous, as it will be when the UGV is there."""
+    here, speed, ways = desk.here(name), desk.team.ugvs[name].speed, desk.team.on_ground
+    options = []
+    for robot in desk.team.uavs.values():
+        place = robot.home[0][1]
+        for since, later in robot.home:
+            path = [here, *ways(here, later)]
+            arrival = desk.time + _length(path) / speed
+            if since <= arrival:
+                place = later
+        path = [here, *ways(here, place)]
+        options.append((_length(path), path[1:]))
+    return list(min(options)[1])
+
+
+def _wait(desk: Desk, name: str) -> None:
+    """Wait where the UAV will come, following the rendezvous where it moves on; not at all without a UAV."""
+    direct = desk.policy.receiver == "medic" or desk.agents[name].relay_lost
+    corners = [desk.here(name)]
+    if desk.settings.rendezvous == "moving" and not direct:
+        corners = _to_rendezvous(desk, name)
+    desk.drive(name, corners, desk.team.ugvs[name].speed, hold=0.0 if direct else desk.settings.patience)
+
+
+def _look_for_medic(desk: Desk, name: str) -> None:
+    """Drive to where a medic is believed, or known, to be when it gets there; then along his queue, and wait at its end."""
+    me: Ugv = desk.agents[name]
+    knows = desk.policy.receiver == "medic" and desk.settings.knows_medic
+    here, speed = desk.here(name), desk.team.ugvs[name].speed
+    beliefs = {m: medic.belief(desk, m) for m in desk.team.medics} if knows else me.beliefs or {}
+    courses = {m: predict(b, desk.team.on_foot) for m, b in beliefs.items() if m not in me.unreachable}
+    target = min(courses, key=lambda m: (meeting_time(courses[m], here, speed, desk.time), m))
+    corners = chase(courses[target], here, speed, desk.time, desk.team.on_ground)
+    desk.drive(name, corners, speed, hold=desk.settings.linger)
+
+
+def _give_up(desk: Desk, name: str) -> None:
+    """Say that its casualties cannot be delivered; search on, for a medic may yet come by."""
+    me: Ugv = desk.agents[name]
+    for r in me.reports:
+        if r.id not in me.told:
+            desk.note(name, "undeliverable", r.id)
+    desk.change(name, told=me.told | {r.id for r in me.reports})
+    if me.searched:
+        desk.fire(name, "all over, nobody to report to")
+        desk.send(name, ())
+    else:
+        desk.fire(name, "nobody to report to")
+        _back(desk, name)
+
+
+def _back(desk: Desk, name: str) -> None:
+    left = desk.agents[name].left
+    _drive(desk, name, desk.team.on_ground(desk.here(name), left))
+
+
+def _drive_to(desk: Desk, name: str, place: XY) -> None:
+    _drive(desk, name, desk.team.on_ground(desk.here(name), place))
+
+
+def _drive(desk: Desk, name: str, corners: Sequence[XY]) -> None:
+    desk.drive(name, corners, desk.team.ugvs[name].speed)
+
+
+def _length(path: list[XY]) -> float:
+    return sum(((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2) ** 0.5 for a, b in pairwise(path))

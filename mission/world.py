@@ -1,0 +1,336 @@
+"""The fast world: points that move at constant speed between waypoints, from event to event, no time steps.
+
+It asks a director as PyBullet does (see `director`), but sightings, meetings and arrivals are computed in closed form, so
+thousands of missions a minute can be studied.
+"""
+
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import inf
+from typing import Any, Literal
+
+import numba
+import numpy as np
+
+from quarterdeck.mission.director import Command, Director, Event, State
+
+SAME = 1e-9  # s: events this close are one moment
+EDGE = 1e-6  # m: contact is lost this far beyond the range, so that a range just reached is not lost by rounding
+_MOST_CALLS = 10_000  # at one moment: a director that commands for ever without time passing is wrong
+
+
+@dataclass(frozen=True, slots=True)
+class Actor:
+    """Somebody who moves: `speed` m/s where a waypoint gives none; sees targets within `sees` metres, on the plan."""
+
+    id: str
+    x: float
+    y: float
+    z: float = 0.0
+    speed: float = 1.0
+    sees: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Something that stands still and can be seen; `data` goes with the event."""
+
+    id: str
+    x: float
+    y: float
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """At `time` seconds an actor stops for ever (`stop`), or goes on but is met by nobody any more (`mute`)."""
+
+    actor: str
+    time: float
+    kind: Literal["stop", "mute"] = "stop"
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What happened. `tracks` (n, 3) seconds, x, y by actor, straight in between; `events` (time, event) in order.
+
+    `end` is the time of the last event; `memory` is what the director had in mind then. `reason` says why the run was cut
+    short, if it was.
+    """
+
+    tracks: Mapping[str, np.ndarray]
+    events: tuple[tuple[float, Event], ...]
+    end: float
+    memory: Any
+    reason: str = ""
+
+    def length(self, actor: str) -> float:
+        """Return the metres that an actor moved."""
+        return float(np.hypot(*np.diff(self.tracks[actor][:, 1:], axis=0).T).sum())
+
+
+def run_world(
+    director: Director,
+    actors: Sequence[Actor],
+    targets: Sequence[Target],
+    pairs: Sequence[tuple[int, int]],
+    reach: float,
+    *,
+    faults: Sequence[Fault] = (),
+    until: float = 7 * 86400.0,
+) -> Run:
+    """Run until nothing more can happen, or the time `until` in seconds.
+
+    `pairs` are the indices of actors who notice each other within `reach` metres: event `met`, once each time they come
+    into range. Further events: `seen` (each target once by each actor, its `data` and position with it), `served` (a
+    waypoint's task, after its hold) and `lost`. The director is called at each, and whenever somebody has become idle.
+    """
+    ids = [a.id for a in actors]
+    index = {name: i for i, name in enumerate(ids)}
+    n = len(actors)
+    spots = np.array([(s.x, s.y) for s in targets], dtype=float).reshape(-1, 2)
+    partners: list[list[tuple[int, int]]] = [[] for _ in actors]
+    for k, (i, j) in enumerate(pairs):
+        partners[i].append((k, j))
+        partners[j].append((k, i))
+    plans = [_Plan(0.0, a.x, a.y, a.speed, ()) for a in actors]
+    tracks: list[list[np.ndarray]] = [[] for _ in actors]
+    unseen = np.ones((n, len(targets)), dtype=bool)
+    sight = np.full((n, len(targets)), inf)
+    contact = [False] * len(pairs)
+    switch = [inf] * len(pairs)
+    alive, mute = [True] * n, [False] * n
+    pending = sorted(faults, key=lambda f: (f.time, f.actor))
+    log: list[tuple[float, Event]] = []
+
+    def look_ahead(i: int, now: float) -> None:
+        """Work out afresh what actor i will see and meet on its present course."""
+        if actors[i].sees > 0 and alive[i] and len(targets):
+            sight[i] = np.where(unseen[i], _sightings(plans[i].knots, spots, actors[i].sees, now), inf)
+        else:
+            sight[i] = inf
+        for k, j in partners[i]:
+            if not (alive[i] and alive[j]) or mute[i] or mute[j]:
+                switch[k] = inf
+            elif contact[k]:
+                switch[k] = _crossing(plans[i].knots, plans[j].knots, reach + EDGE, now, False)
+            else:
+                switch[k] = _crossing(plans[i].knots, plans[j].knots, reach, now, True)
+
+    for i in range(n):
+        look_ahead(i, 0.0)
+    events: list[Event] = []
+    now, memory, calls = 0.0, None, 0
+    while True:
+        states = {ids[i]: _state(plans[i], actors[i].z, now, alive[i]) for i in range(n)}
+        for plan in plans:
+            plan.told = plan.end <= now + SAME
+        commands, memory = director(now, states, tuple(events), memory)
+        for name, command in commands.items():
+            i = index[name]
+            if alive[i]:
+                here = states[name]
+                tracks[i].append(_until(plans[i].knots, now))
+                plans[i] = _Plan(now, here.x, here.y, actors[i].speed, command)
+        for name in commands:
+            look_ahead(index[name], now)
+
+        then = min(
+            min((p.next_stop() for p in plans), default=inf),
+            float(sight.min()) if sight.size else inf,
+            min(switch, default=inf),
+            pending[0].time if pending else inf,
+        )
+        if then == inf or then > until:
+            reason = "" if then == inf else f"the mission was not over after {until:g} s"
+            break
+        calls = calls + 1 if then <= now + SAME else 0
+        if calls > _MOST_CALLS:
+            raise RuntimeError(f"the director does not let time pass at {now:.3f} s")
+        now, events = max(then, now), []
+        while pending and pending[0].time <= now + SAME:
+            fault = pending.pop(0)
+            i = index[fault.actor]
+            mute[i] = True
+            if fault.kind == "stop":
+                here = _state(plans[i], 0.0, now, True)
+                tracks[i].append(_until(plans[i].knots, now))
+                plans[i] = _Plan(now, here.x, here.y, actors[i].speed, ())
+                plans[i].told = True
+                alive[i] = False
+            look_ahead(i, now)
+            events.append(Event("lost", fault.actor, data={"kind": fault.kind}))
+        for i, plan in enumerate(plans):
+            events += [Event("served", ids[i], task) for task in plan.tasks_until(now)]
+        for i, k in zip(*np.nonzero(sight <= now + SAME), strict=True):
+            unseen[i, k], sight[i, k] = False, inf
+            target = targets[k]
+            events.append(Event("seen", ids[i], target.id, {"x": target.x, "y": target.y, **target.data}))
+        for k, (i, j) in enumerate(pairs):
+            if switch[k] <= now + SAME:
+                contact[k] = not contact[k]
+                if contact[k]:
+                    events.append(Event("met", ids[i], ids[j]))
+                knots = plans[i].knots, plans[j].knots
+                switch[k] = _crossing(*knots, reach + EDGE if contact[k] else reach, now, not contact[k])
+        log += [(now, e) for e in events]
+    for i, plan in enumerate(plans):
+        tracks[i].append(plan.knots if reason == "" else _until(plan.knots, until))
+    return Run({ids[i]: _joined(tracks[i]) for i in range(n)}, tuple(log), now, memory, reason)
+
+
+class _Plan:
+    """One actor's course from its last command: `knots` (m, 3) seconds, x, y; `served` the times its waypoints are over."""
+
+    __slots__ = ("end", "knots", "served", "tasks", "told")
+
+    def __init__(self, time: float, x: float, y: float, speed: float, command: Command | tuple) -> None:
+        knots, self.served, self.tasks = [(time, x, y)], [], []
+        for w in command.waypoints if isinstance(command, Command) else ():
+            if w.time > time:
+                time = w.time
+                knots.append((time, x, y))
+            time += ((w.x - x) ** 2 + (w.y - y) ** 2) ** 0.5 / (w.speed or speed)
+            x, y = w.x, w.y
+            knots.append((time, x, y))
+            if w.hold > 0:
+                time += w.hold
+                knots.append((time, x, y))
+            self.served.append(time)
+            if w.task is not None:
+                self.tasks.append((time, w.task))
+        self.knots = np.array(knots)
+        self.end = time
+        self.told = not self.served  # the director knows that it is idle
+
+    def next_stop(self) -> float:
+        """Return when a task of it is over or, if the director does not know yet, all of it; infinity if never."""
+        done = inf if self.told else self.end
+        return min(done, self.tasks[0][0]) if self.tasks else done
+
+    def tasks_until(self, now: float) -> list[str]:
+        """Take out and return the tasks that are over."""
+        if not self.tasks or self.tasks[0][0] > now + SAME:
+            return []
+        over = [task for time, task in self.tasks if time <= now + SAME]
+        self.tasks = self.tasks[len(over) :]
+        return over
+
+
+def _state(plan: _Plan, z: float, now: float, alive: bool) -> State:
+    x, y, heading = _at(plan.knots, now)
+    served = plan.served
+    reached = len(served) if plan.end <= now + SAME else bisect_right(served, now + SAME)
+    return State(x, y, z, heading, alive, reached, reached == len(served))
+
+
+def _until(knots: np.ndarray, now: float) -> np.ndarray:
+    """Return the knots before `now`, and where the actor is then."""
+    x, y, _ = _at(knots, now)
+    return np.vstack([knots[knots[:, 0] < now], (now, x, y)])
+
+
+def _joined(pieces: list[np.ndarray]) -> np.ndarray:
+    """Return one track of the pieces of many commands, without knots that repeat the one before."""
+    knots = np.concatenate(pieces)
+    keep = np.ones(len(knots), dtype=bool)
+    keep[1:] = np.abs(np.diff(knots, axis=0)).max(axis=1) > SAME
+    return knots[keep]
+
+
+@numba.njit(cache=True)
+def _at(knots: np.ndarray, now: float) -> tuple[float, float, float]:
+    """Return x, y and heading at a time."""
+    n = len(knots)
+    k = min(int(np.searchsorted(knots[:, 0], now, side="right")), n - 1)
+    if k == 0:
+        return knots[0, 1], knots[0, 2], 0.0
+    (t0, x0, y0), (t1, x1, y1) = knots[k - 1], knots[k]
+    heading = np.arctan2(y1 - y0, x1 - x0)
+    if now >= t1 or t1 <= t0:
+        return x1, y1, heading
+    s = max(0.0, (now - t0) / (t1 - t0))
+    return x0 + s * (x1 - x0), y0 + s * (y1 - y0), heading
+
+
+@numba.njit(cache=True)
+def _sightings(knots: np.ndarray, spots: np.ndarray, reach: float, now: float) -> np.ndarray:
+    """Return (m,) first times from `now` on at which a course is within `reach` of each of (m, 2) spots, or infinity."""
+    times = np.full(len(spots), np.inf)
+    for c in range(len(spots)):
+        for k in range(len(knots)):
+            t0 = max(knots[k, 0], now)
+            t1 = knots[k + 1, 0] if k + 1 < len(knots) else np.inf
+            if t1 < now or (t1 == knots[k, 0] and k + 1 < len(knots)):
+                continue
+            vx, vy = _velocity(knots, k)
+            dx = knots[k, 1] + vx * (t0 - knots[k, 0]) - spots[c, 0]
+            dy = knots[k, 2] + vy * (t0 - knots[k, 0]) - spots[c, 1]
+            s = _entry(dx, dy, vx, vy, reach)
+            if t0 + s <= t1:
+                times[c] = t0 + s
+                break
+    return times
+
+
+@numba.njit(cache=True)
+def _crossing(a: np.ndarray, b: np.ndarray, reach: float, now: float, entering: bool) -> float:
+    """Return the first time from `now` on at which two courses come within `reach`, or go beyond it; infinity if never."""
+    if reach == np.inf:
+        return now if entering else np.inf
+    i = max(int(np.searchsorted(a[:, 0], now, side="right")) - 1, 0)
+    j = max(int(np.searchsorted(b[:, 0], now, side="right")) - 1, 0)
+    t0 = now
+    while True:
+        ta = a[i + 1, 0] if i + 1 < len(a) else np.inf
+        tb = b[j + 1, 0] if j + 1 < len(b) else np.inf
+        t1 = min(ta, tb)
+        if t1 > t0 or t1 == np.inf:
+            ax, ay = _velocity(a, i)
+            bx, by = _velocity(b, j)
+            dx = a[i, 1] + ax * (t0 - a[i, 0]) - b[j, 1] - bx * (t0 - b[j, 0])
+            dy = a[i, 2] + ay * (t0 - a[i, 0]) - b[j, 2] - by * (t0 - b[j, 0])
+            s = _entry(dx, dy, ax - bx, ay - by, reach) if entering else _exit(dx, dy, ax - bx, ay - by, reach)
+            if t0 + s <= t1 and s < np.inf:
+                return t0 + s
+        if t1 == np.inf:
+            return np.inf
+        t0 = max(float(t1), t0)
+        if ta <= t1:
+            i += 1
+        if tb <= t1:
+            j += 1
+
+
+@numba.njit(cache=True)
+def _velocity(knots: np.ndarray, k: int) -> tuple[float, float]:
+    if k + 1 >= len(knots) or knots[k + 1, 0] <= knots[k, 0]:
+        return 0.0, 0.0
+    dt = knots[k + 1, 0] - knots[k, 0]
+    return (knots[k + 1, 1] - knots[k, 1]) / dt, (knots[k + 1, 2] - knots[k, 2]) / dt
+
+
+@numba.njit(cache=True)
+def _entry(dx: float, dy: float, vx: float, vy: float, reach: float) -> float:
+    """Return the first s >= 0 with |d + s v| <= reach, or infinity."""
+    c = dx * dx + dy * dy - reach * reach
+    if c <= 0.0:
+        return 0.0
+    a, b = vx * vx + vy * vy, dx * vx + dy * vy
+    root = b * b - a * c
+    if a == 0.0 or b >= 0.0 or root < 0.0:
+        return np.inf
+    return c / (-b + np.sqrt(root))
+
+
+@numba.njit(cache=True)
+def _exit(dx: float, dy: float, vx: float, vy: float, reach: float) -> float:
+    """Return the first s >= 0 from which on |d + s v| > reach, or infinity."""
+    c = dx * dx + dy * dy - reach * reach
+    a, b = vx * vx + vy * vy, dx * vx + dy * vy
+    if c > 0.0:
+        return 0.0
+    if a == 0.0:
+        return np.inf
+    return (-b + np.sqrt(max(b * b - a * c, 0.0))) / a
