@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 
-import numba as nb
 import numpy as np
 import shapely
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import maximum_bipartite_matching
 from shapely import MultiPolygon
+
+from quarterdeck.geo.scanline import inside
 
 TOLERANCE = 1e-6  # of the spacing: tracks keep this far inside, so that exact predicates agree in every frame
 
@@ -53,8 +54,8 @@ def lay_grid(area: MultiPolygon, spacing: float, angle: float, shift: tuple[floa
     low, high = 2.0 * np.floor(corners.min(axis=0) / 2.0), 2.0 * np.ceil(corners.max(axis=0) / 2.0)
     edges -= np.tile(low, 2)
     columns, rows = (high - low).astype(int)
-    cells, right = _inside(edges, rows, columns)
-    cells_by_column, up = _inside(edges[:, [1, 0, 3, 2]], columns, rows)
+    cells, right = inside(edges, rows, columns)
+    cells_by_column, up = inside(edges[:, [1, 0, 3, 2]], columns, rows)
     cells &= cells_by_column.T
     up = up.T.copy()
     corner = _rotation(angle) @ (low * spacing + np.array(shift))
@@ -84,47 +85,6 @@ def turned(edges: np.ndarray, angle: float, spacing: float) -> np.ndarray:
 def _rotation(angle: float) -> np.ndarray:
     cos, sin = np.cos(angle), np.sin(angle)
     return np.array([[cos, -sin], [sin, cos]])
-
-
-@nb.njit(cache=True)
-def crossings(edges: np.ndarray, rows: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return where the lines y = i + 0.5 cross the edges: `first` (rows + 1,) and the sorted x of all, line after line."""
-    first = np.zeros(rows + 1, np.int64)
-    for e in range(len(edges)):
-        low, high = min(edges[e, 1], edges[e, 3]), max(edges[e, 1], edges[e, 3])
-        for i in range(max(0, int(np.ceil(low - 0.5))), min(rows, int(np.ceil(high - 0.5)))):
-            first[i + 1] += 1
-    for i in range(rows):
-        first[i + 1] += first[i]
-    x = np.empty(first[rows])
-    filled = first[:-1].copy()
-    for e in range(len(edges)):
-        x0, y0, x1, y1 = edges[e]
-        low, high = min(y0, y1), max(y0, y1)
-        for i in range(max(0, int(np.ceil(low - 0.5))), min(rows, int(np.ceil(high - 0.5)))):
-            value = x0 + (i + 0.5 - y0) * (x1 - x0) / (y1 - y0)
-            at = filled[i]
-            while at > first[i] and x[at - 1] > value:
-                x[at] = x[at - 1]
-                at -= 1
-            x[at] = value
-            filled[i] += 1
-    return first, x
-
-
-@nb.njit(cache=True)
-def _inside(edges: np.ndarray, rows: int, columns: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return two (rows, columns) bool arrays: the cell's centre is inside, so is the move to the next column's."""
-    first, x = crossings(edges, rows)
-    cells = np.zeros((rows, columns), np.bool_)
-    along = np.zeros((rows, columns), np.bool_)
-    for i in range(rows):
-        for at in range(first[i], first[i + 1] - 1, 2):
-            start = int(np.ceil(x[at] - 0.5))
-            stop = int(np.ceil(x[at + 1] - 0.5))
-            cells[i, start:stop] = True
-            along[i, start : max(start, stop - 1)] = True  # stop may be 0, and -1 would be the last
-    return cells, along
 
 
 def _hypervertices(cells: np.ndarray, right: np.ndarray, up: np.ndarray) -> np.ndarray:

@@ -84,3 +84,11 @@ def test_sliver_between_hypervertices_drops_the_fewest(thickness):
     grid = lay_grid(as_multipolygon(box(0, 0, 40, 80).difference(wall)), 10.0, 0.0, (0.0, 0.0))
     assert grid.hypervertices.sum() == 8 - 3
     assert grid.cells.sum() == 32
+
+
+def test_strip_thinner_than_half_a_cell_has_no_moves():
+    """A strip that holds no centre beside the lattice's first column gives no cells and no moves in its rows."""
+    area = as_multipolygon(box(1, 0, 3, 60).union(box(1, 50, 95, 100)))
+    grid = lay_grid(area, 10.0, 0.0, (0.0, 0.0))
+    assert not grid.cells[:5].any()
+    assert not grid.right[:5].any()
