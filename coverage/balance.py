@@ -294,17 +294,24 @@ def _chains(labels, starts, targets, width, rng):  # type: ignore[no-untyped-def
     k = len(starts)
     _, _, _, _, _, weight = hanging(labels, starts, width)
     surplus = -targets.copy()
-    movable = np.zeros((k, k), dtype=np.int32)
+    movable = np.full((k, k), -1, dtype=np.int32)  # the first entry of a list of cells for each pair of regions
+    count = 0
     for cell in range(width, len(labels) - width):
-        i = labels[cell]
-        if i < 0:
-            continue
-        surplus[i] += 1
-        if weight[cell] == 1:
+        if labels[cell] >= 0:
+            surplus[labels[cell]] += 1
+            count += weight[cell] == 1 and _beside_another(labels, cell, width)
+    entry = np.empty(4 * count, dtype=np.int32)
+    after = np.empty(4 * count, dtype=np.int32)
+    count = 0
+    for cell in range(width, len(labels) - width):
+        if weight[cell] == 1 and labels[cell] >= 0:
+            i = labels[cell]
             for step in (-1, 1, -width, width):
                 j = labels[cell + step]
                 if j >= 0 and j != i:
-                    movable[i, j] += 1
+                    entry[count], after[count] = cell, movable[i, j]
+                    movable[i, j] = count
+                    count += 1
     free = np.ones(k, dtype=np.bool_)
     moves = 0
     came = np.empty(k, dtype=np.int32)
@@ -320,7 +327,7 @@ def _chains(labels, starts, targets, width, rng):  # type: ignore[no-untyped-def
             i = queue[first]
             first += 1
             for j in rng.permutation(k):
-                if came[j] < 0 and movable[i, j] > 0 and free[j]:
+                if came[j] < 0 and movable[i, j] >= 0 and free[j]:
                     came[j] = i
                     queue[last] = j
                     last += 1
@@ -331,7 +338,7 @@ def _chains(labels, starts, targets, width, rng):  # type: ignore[no-untyped-def
         while j >= 0 and j != source:
             i = came[j]
             free[i] = free[j] = False
-            if _move_one(labels, i, j, weight, width):
+            if _move_one(labels, i, j, movable, entry, after, width):
                 moves += 1
             else:
                 break
@@ -340,25 +347,34 @@ def _chains(labels, starts, targets, width, rng):  # type: ignore[no-untyped-def
 
 
 @numba.njit(cache=True)
-def _move_one(labels, i, j, weight, width):  # type: ignore[no-untyped-def]
-    """Move a cell of weight 1 from i to j, the one with most neighbours in j; i has lost nothing since the search.
+def _beside_another(labels: np.ndarray, cell: int, width: int) -> bool:
+    up, down, left, right = labels[cell - width], labels[cell + width], labels[cell - 1], labels[cell + 1]
+    own = labels[cell]
+    vertical = (up >= 0 and up != own) or (down >= 0 and down != own)
+    return vertical or (left >= 0 and left != own) or (right >= 0 and right != own)
+
+
+@numba.njit(cache=True)
+def _move_one(labels, i, j, movable, entry, after, width):  # type: ignore[no-untyped-def]
+    """Move one of the listed cells from i to j, the one with most neighbours in j; i has lost nothing since the search.
 
     j may have lost one cell, so the neighbour in j must still be there.
     """
     best, best_score = -1, -9
-    for cell in range(width, len(labels) - width):
-        if labels[cell] == i and weight[cell] == 1:
-            score, touches = 0, False
-            for step in (-1, 1, -width, width):
-                there = labels[cell + step]
-                if there == j:
-                    touches = True
-                    score += 1
-                elif there == i:
-                    score -= 1
-            if touches and score > best_score:
-                best, best_score = cell, score
+    at = movable[i, j]
+    while at >= 0:
+        cell = entry[at]
+        at = after[at]
+        score, touches = 0, False
+        for step in (-1, 1, -width, width):
+            there = labels[cell + step]
+            if there == j:
+                touches = True
+                score += 1
+            elif there == i:
+                score -= 1
+        if touches and labels[cell] == i and score > best_score:
+            best, best_score = cell, score
     if best >= 0:
         labels[best] = j
-        return True
-    return False
+    return best >= 0
