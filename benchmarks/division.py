@@ -1,8 +1,8 @@
 """Divide one instance and walk its tours: `python benchmarks/division.py FILE.npz --json`.
 
 FILE.npz holds `grid` (R, C), 1 a free hypervertex, and `starts` (k, 2), row and column; starts that coincide or are not
-free get the nearest distinct entries. One JSON object on stdout. Moves are between path cells (4 a hypervertex) on closed tours;
-seconds are the median of the warm runs in this process, compilation apart; a plan is the division and all tours.
+free get the nearest distinct entries. One JSON object on stdout. Moves are between path cells (4 a hypervertex) on closed
+tours; seconds are the median of the warm runs in this process, compilation apart; a plan is the division and all tours.
 """
 
 import argparse
@@ -82,8 +82,8 @@ def main() -> None:
         f = figures
         print(
             f"{f['file']}: {f['vehicles']} vehicles, {f['cells']} cells, makespan {f['makespan']} moves, at least "
-            f"{f['bound']} ({f['proof']}), ratio {f['ratio']:.4f}, regions {f['smallest']} to {f['largest']}, {f['turns']} turns, "
-            f"{f['seconds']['division']:.3f} s + {f['seconds']['tours']:.3f} s, {f['peak_mb']} MB"
+            f"{f['bound']} ({f['proof']}), ratio {f['ratio']:.4f}, regions {f['smallest']} to {f['largest']}, "
+            f"{f['turns']} turns, {f['seconds']['division']:.3f} s + {f['seconds']['tours']:.3f} s, {f['peak_mb']} MB"
         )
 
 
