@@ -1,0 +1,102 @@
+"""The proof that guards see everything: exact areas, by two routes that have nothing in common but shapely.
+
+The first unites the views from triangular expansion. The second knows no triangulation: what a guard sees is its disc less
+the shadow of every wall. Both take the disc as an inscribed polygon, so what they call seen is seen.
+"""
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon
+
+from quarterdeck.coverage.guards.space import HAIR, Space
+from quarterdeck.geo.scenario import as_multipolygon
+from quarterdeck.geo.triangulation import Triangulation
+from quarterdeck.geo.visibility import DISC_SIDES, visibility_polygons
+
+TOLERANCE = 1e-9  # of the target's area: less than this uncovered is rounding
+
+
+def uncovered(space: Space, views: np.ndarray) -> MultiPolygon:
+    """Return the part of the target in none of the views; empty if it is less than TOLERANCE of it."""
+    rest = as_multipolygon(space.target.difference(shapely.union_all(views)))
+    return MultiPolygon() if rest.area <= TOLERANCE * space.target.area else rest
+
+
+def mend(space: Space, mesh: Triangulation, guards: np.ndarray, reach: float) -> tuple[np.ndarray, MultiPolygon]:
+    """Add guards until the target is seen; return all (k, 2) guards and what cannot be seen from where robots may be.
+
+    Sight is mutual: where a guard may stand to see a place is what that place sees, within reach of the robots.
+    """
+    views = visibility_polygons(mesh, guards, reach)
+    rest = uncovered(space, views)
+    hopeless: list[shapely.Polygon] = []
+    smallest = (reach / 64) ** 2
+    inner = as_multipolygon(space.reach.buffer(-2 * HAIR))
+    standing = inner if inner.area > 0.5 * space.reach.area else space.reach
+    while not rest.is_empty:
+        piece = max(rest.geoms, key=lambda g: g.area)
+        place = np.array(shapely.get_coordinates(shapely.point_on_surface(piece))[0])
+        region = visibility_polygons(mesh, place, reach * (1 - 1e-3))[0].intersection(standing)
+        if region.area <= 0:
+            halves = _quarters(piece) if piece.area > smallest else []
+            hopeless += [] if halves else [piece]
+            others = [g for g in rest.geoms if g is not piece]
+            rest = as_multipolygon(shapely.GeometryCollection(others + halves))
+            continue
+        found = space.kept(_places(region, piece))
+        found = found[shapely.contains_xy(space.reach, found[:, 0], found[:, 1])]
+        seen = visibility_polygons(mesh, found, reach)
+        best = int(np.argmax(shapely.area(shapely.intersection(seen, rest))))
+        after = as_multipolygon(rest.difference(seen[best]))
+        if after.area >= rest.area * (1 - 1e-12):
+            hopeless.append(piece)
+            rest = as_multipolygon(shapely.GeometryCollection([g for g in rest.geoms if g is not piece]))
+            continue
+        guards = np.vstack([guards, found[best]])
+        rest = MultiPolygon() if after.area <= 0.5 * TOLERANCE * space.target.area else after
+    lost = as_multipolygon(shapely.union_all(hopeless))
+    return guards, MultiPolygon() if lost.area <= TOLERANCE * space.target.area else lost
+
+
+def _quarters(piece: shapely.Polygon) -> list[shapely.Polygon]:
+    west, south, east, north = piece.bounds
+    x, y = (west + east) / 2, (south + north) / 2
+    boxes = [shapely.box(*b) for b in ((west, south, x, y), (x, south, east, y), (west, y, x, north), (x, y, east, north))]
+    return [p for box in boxes for p in as_multipolygon(piece.intersection(box)).geoms]
+
+
+def _places(region: shapely.Geometry, piece: shapely.Polygon) -> np.ndarray:
+    """Return places to stand: the region's heart, and the ones nearest to the piece and between."""
+    heart = shapely.get_coordinates(shapely.point_on_surface(region))[0]
+    near = shapely.get_coordinates(shapely.shortest_line(region, piece.centroid))[0]
+    places = [heart, near]
+    corners = shapely.get_coordinates(region)
+    places += [heart + (corner - heart) * share for corner in corners[:: max(1, len(corners) // 8)] for share in (0.5, 0.98)]
+    return np.array(places)
+
+
+def uncovered_by_shadows(target: MultiPolygon, sight: MultiPolygon, guards: np.ndarray, ranges: np.ndarray) -> float:
+    """Return the square metres of the target that (k, 2) guards with (k,) ranges do not see, without any triangulation."""
+    rings = [r for p in sight.geoms for r in (p.exterior, *p.interiors)]
+    corners = [shapely.get_coordinates(r) for r in rings]
+    walls = np.concatenate([np.stack([c[:-1], c[1:]], axis=1) for c in corners])
+    tree = shapely.STRtree(shapely.linestrings(walls))
+    views = []
+    for guard, reach in zip(guards, ranges, strict=True):
+        angle = np.linspace(0.0, 2 * np.pi, DISC_SIDES, endpoint=False)
+        disc = shapely.Polygon(guard + reach * np.column_stack([np.cos(angle), np.sin(angle)]))
+        near = tree.query(shapely.Point(guard), predicate="dwithin", distance=reach)
+        views.append(disc.difference(shapely.union_all(_shadows(guard, walls[np.sort(near)], reach))))
+    return float(target.difference(shapely.union_all(views)).area)
+
+
+def _shadows(guard: np.ndarray, walls: np.ndarray, reach: float) -> np.ndarray:
+    """Return the polygons that walls (n, 2, 2) hide from a guard, at least as far as its range."""
+    along = walls[:, 1] - walls[:, 0]
+    foot = np.clip(((guard - walls[:, 0]) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
+    middle = walls[:, 0] + foot[:, None] * along  # cut there, no half is seen under more than a right angle
+    halves = np.concatenate([np.stack([walls[:, 0], middle], axis=1), np.stack([middle, walls[:, 1]], axis=1)])
+    halves = halves[(halves[:, 0] != halves[:, 1]).any(axis=1)]
+    away = halves - guard
+    far = guard + away * np.maximum(1.0, 3 * reach / np.linalg.norm(away, axis=2, keepdims=True))
+    return shapely.make_valid(shapely.polygons(np.concatenate([halves, far[:, ::-1]], axis=1)))
