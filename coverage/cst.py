@@ -50,7 +50,7 @@ def constrained_tour(parent: np.ndarray, guards: np.ndarray, graph: Graph) -> li
 
 
 def revised_tour(parent: np.ndarray, guards: np.ndarray, points: np.ndarray) -> list[int]:
-    """Return Revised-DMST over the guards: the walk's first visits, straight from one to the next, through walls if need be.
+    """Return Revised-DMST over the guards: the walk's first visits, straight on, through walls if need be.
 
     Only a yardstick for Property 1. It visits root and guards alone: measured over all vertices the property fails, as CST
     leaves out obstacle endpoints.

@@ -151,7 +151,9 @@ def _grow(
         for robot in turns:
             if left == 0:
                 break
-            v = _nearest(starts, indices, lengths, points, guard, parents[robot], visited, last, turns, robot, distance, before)
+            v = _nearest(
+                starts, indices, lengths, points, guard, parents[robot], visited, last, turns, robot, distance, before
+            )
             if v < 0:
                 continue
             moved = True

@@ -28,32 +28,34 @@ def mend(space: Space, mesh: Triangulation, guards: np.ndarray, reach: float) ->
     Sight is mutual: where a guard may stand to see a place is what that place sees, within reach of the robots.
     """
     views = visibility_polygons(mesh, guards, reach)
-    rest = uncovered(space, views)
+    rest = list(uncovered(space, views).geoms)
     hopeless: list[shapely.Polygon] = []
     smallest = (reach / 64) ** 2
     inner = as_multipolygon(space.reach.buffer(-2 * HAIR))
     standing = inner if inner.area > 0.5 * space.reach.area else space.reach
-    while not rest.is_empty:
-        piece = max(rest.geoms, key=lambda g: g.area)
+    while rest:
+        piece = rest.pop(int(np.argmax(shapely.area(rest))))
         place = np.array(shapely.get_coordinates(shapely.point_on_surface(piece))[0])
         region = visibility_polygons(mesh, place, reach * (1 - 1e-3))[0].intersection(standing)
-        if region.area <= 0:
-            halves = _quarters(piece) if piece.area > smallest else []
-            hopeless += [] if halves else [piece]
-            others = [g for g in rest.geoms if g is not piece]
-            rest = as_multipolygon(shapely.GeometryCollection(others + halves))
-            continue
-        found = space.kept(_places(region, piece))
-        found = found[shapely.contains_xy(space.reach, found[:, 0], found[:, 1])]
-        seen = visibility_polygons(mesh, found, reach)
-        best = int(np.argmax(shapely.area(shapely.intersection(seen, rest))))
-        after = as_multipolygon(rest.difference(seen[best]))
-        if after.area >= rest.area * (1 - 1e-12):
+        if region.area > 0:
+            found = space.kept(_places(region, piece))
+            found = found[shapely.contains_xy(space.reach, found[:, 0], found[:, 1])]
+            seen = visibility_polygons(mesh, found, reach)
+            gains = shapely.area(shapely.intersection(seen, piece))
+            best = int(np.argmax(gains)) if len(found) else -1
+            # Every guard sees a whole piece or a fair area: else the rim of what can be seen would take ever more.
+            if best >= 0 and (gains[best] > smallest or gains[best] >= piece.area * (1 - 1e-6)):
+                guards = np.vstack([guards, found[best]])
+                left = shapely.difference(np.array([*rest, piece], dtype=object), seen[best])
+                rest = [p for g in left for p in as_multipolygon(g).geoms]
+                if shapely.area(rest).sum() <= 0.5 * TOLERANCE * space.target.area:
+                    break
+                continue
+        west, south, east, north = piece.bounds
+        if max(east - west, north - south) ** 2 > smallest:
+            rest += _quarters(piece)
+        else:
             hopeless.append(piece)
-            rest = as_multipolygon(shapely.GeometryCollection([g for g in rest.geoms if g is not piece]))
-            continue
-        guards = np.vstack([guards, found[best]])
-        rest = MultiPolygon() if after.area <= 0.5 * TOLERANCE * space.target.area else after
     lost = as_multipolygon(shapely.union_all(hopeless))
     return guards, MultiPolygon() if lost.area <= TOLERANCE * space.target.area else lost
 
@@ -71,7 +73,9 @@ def _places(region: shapely.Geometry, piece: shapely.Polygon) -> np.ndarray:
     near = shapely.get_coordinates(shapely.shortest_line(region, piece.centroid))[0]
     places = [heart, near]
     corners = shapely.get_coordinates(region)
-    places += [heart + (corner - heart) * share for corner in corners[:: max(1, len(corners) // 8)] for share in (0.5, 0.98)]
+    places += [
+        heart + (corner - heart) * share for corner in corners[:: max(1, len(corners) // 8)] for share in (0.5, 0.98)
+    ]
     return np.array(places)
 
 

@@ -17,9 +17,10 @@ DECIMALS = 9  # of a degree, as a PLAN file writes positions
 
 @dataclass(frozen=True, slots=True)
 class Space:
-    """What is to be seen (`target`), what sight passes through (`sight`, holds the target) and where robots may be (`reach`).
+    """What is to be seen (`target`), what sight passes through (`sight`) and where robots may be (`reach`).
 
-    All in metres. `frame`, where given, rounds guards to positions that a PLAN file keeps exactly.
+    All in metres; `sight` holds the target. `frame`, where given, rounds guards to positions that a PLAN
+    file keeps exactly.
     """
 
     target: MultiPolygon

@@ -1,0 +1,98 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from quarterdeck.coverage.guards.certificate import uncovered_by_shadows
+from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.frame import Frame
+from quarterdeck.geo.models import load_model
+from quarterdeck.geo.scenario import Area, Obstacle, Scenario, Site, Vehicle, as_multipolygon
+from quarterdeck.mission.guards import plan_guards
+from quarterdeck.mission.planfile import plan_text
+
+BORDER = shapely.box(0, 0, 60, 40)
+PILLARS = (shapely.box(10, 10, 20, 30), shapely.Polygon([(30, 5), (50, 8), (45, 20)]), shapely.box(30, 28, 50, 34))
+
+
+def scenario(*starts: tuple[float, float], clearance: float = 0.0, area: shapely.Geometry = BORDER) -> Scenario:
+    """Return huskies among three pillars."""
+    fleet = tuple(Vehicle(f"r{i}", load_model("husky"), xy, clearance=clearance) for i, xy in enumerate(starts))
+    obstacles = tuple(Obstacle(f"o{i}", p) for i, p in enumerate(PILLARS))
+    site = Site((Area("a", as_multipolygon(area)),), as_multipolygon(area), obstacles)
+    return Scenario("pillars", Frame(8.0, 54.0), site, fleet)
+
+
+@pytest.mark.parametrize("mode", ["paper", "optimised"])
+@pytest.mark.parametrize("clearance", [0.0, 0.7])
+def test_everything_is_seen_and_every_guard_is_passed_once(mode: str, clearance: float) -> None:
+    """The certificate holds by the other route too, and each guard is a stop of exactly one route."""
+    given = scenario((1, 1), (59, 39), (30, 1), clearance=clearance)
+    mission = plan_guards(given, range=12.0, mode=mode)  # type: ignore[arg-type]
+    assert mission.feasible
+    assert mission.figures["certificate"]["uncovered"] == 0.0
+    layer = next(layer for layer in mission.layers if layer.name == "guards")
+    guards = shapely.get_coordinates(layer.geometries)
+    ranges = np.array([p["range"] for p in layer.properties])
+    site = given.site
+    assert uncovered_by_shadows(site.coverable, site.navigable("ground"), guards, ranges) < 1e-9 * site.coverable.area
+    stops = [w for route in mission.routes for w in route.waypoints if w.task]
+    assert sorted(w.task for w in stops) == sorted(f"guard-{i}" for i in range(len(guards)))
+    assert all(np.allclose([w.x, w.y], guards[int(w.task.removeprefix("guard-"))], atol=1e-6) for w in stops)
+    free = site.navigable("ground", 0.99 * clearance).buffer(1e-6)
+    for vehicle, route in zip(mission.vehicles, mission.routes, strict=True):
+        line = shapely.LineString(route.xyz[:, :2])
+        assert free.covers(line)
+        assert tuple(route.xyz[0, :2]) == tuple(route.xyz[-1, :2]) == vehicle.start
+    assert mission.figures["makespan"] >= mission.bounds["makespan"] > 0
+
+
+def test_optimised_is_never_worse_and_the_same_seed_gives_the_same_plan() -> None:
+    """Fewer or as many guards, a makespan as short or shorter, and the same bytes."""
+    given = scenario((1, 1), (2, 1), (3, 1))
+    paper, best = plan_guards(given, range=9.0, mode="paper"), plan_guards(given, range=9.0)
+    assert best.figures["guards"] <= paper.figures["guards"]
+    assert best.figures["makespan"] <= paper.figures["makespan"]
+    assert best.figures["paper"]["makespan"] == paper.figures["makespan"]
+    assert plan_text(best) == plan_text(plan_guards(given, range=9.0))
+
+
+@pytest.mark.parametrize(
+    ("starts", "reach", "text"),
+    [
+        ([(15, 20)], 5.0, "vehicle 'r0' starts in an obstacle"),
+        ([(-90, 0)], 5.0, "vehicle 'r0' starts outside the area"),
+        ([(1, 1)], 0.0, "range 0.0 must be positive"),
+        ([(1, 1)], float("nan"), "range nan must be positive"),
+        ([(1, 1)], None, "vehicle 'r0' has no range"),
+        ([], 5.0, "there is no vehicle"),
+    ],
+)
+def test_wrong_input_is_told_in_a_line(starts: list[tuple[float, float]], reach: float | None, text: str) -> None:
+    """Starts in a hole and outside, ranges of nothing: one line each, for the user."""
+    with pytest.raises(InputError, match=text) as error:
+        plan_guards(scenario(*starts), range=reach)
+    assert "\n" not in str(error.value)
+
+
+def test_a_part_that_nobody_can_reach_is_told_with_its_area() -> None:
+    """Two rooms and a robot in one: the other's square metres are named."""
+    rooms = shapely.union_all([BORDER, shapely.box(100, 0, 110, 10)])
+    with pytest.raises(InputError, match="100 m2 of the area can be reached by no vehicle"):
+        plan_guards(scenario((1, 1), area=rooms), range=12.0)
+    mission = plan_guards(scenario((1, 1), (101, 1), area=rooms), range=12.0)
+    assert mission.feasible
+    assert mission.figures["certificate"]["uncovered"] == 0.0
+
+
+def test_what_cannot_be_seen_is_told() -> None:
+    """A crooked niche that the robot may not enter makes the mission infeasible, with its square metres."""
+    niche = shapely.union_all([BORDER, shapely.box(60, 20, 63, 20.5), shapely.box(62, 20, 63, 30)])
+    given = scenario((5, 5), area=niche)
+    given = replace(given, site=replace(given.site, operating=as_multipolygon(BORDER)))
+    mission = plan_guards(given, range=12.0)
+    assert not mission.feasible
+    unseen = float(mission.reasons[0].split(" m2 cannot be seen")[0])
+    assert 8.0 < unseen < 10.5
+    assert mission.figures["certificate"]["uncovered"] == pytest.approx(unseen, rel=0.05)
