@@ -14,16 +14,17 @@ from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.version import VERSION
 from quarterdeck.mission.mission import Mission, Route
 from quarterdeck.physics.swath import covered_fraction, driven_tracks, planned_tracks
-from quarterdeck.physics.swept import Swept, closest_approaches, sweep
+from quarterdeck.physics.swept import Swept, closest_approaches, excursion, sweep
 from quarterdeck.physics.trace import Trace
 
-# What a run may come to and still pass; None for `cross_track` is half of each vehicle's clearance.
+# What a run may come to and still pass; None is half of each vehicle's clearance.
 LIMITS: dict[str, tuple[float | None, str]] = {
     "coverage_loss": (0.01, "covered by the plan and not by the driven tracks, as a fraction of the area"),
     "collisions": (0, "vehicles that touched or went through anything"),
     "unfinished": (0, "vehicles that did not finish their routes"),
     "unserved": (0, "tasks of the plan not served"),
     "cross_track": (None, "95 % of cross-track errors on straight legs, m (default: half the vehicle's clearance)"),
+    "outside": (None, "how far a vehicle left the operating area, m (default: half its clearance)"),
     "clearance": (0.0, "least distance of a hull to an obstacle, m"),
     "separation": (0.0, "least distance between the hulls of two vehicles, m"),
     "battery": (1.0, "energy used over the battery's"),
@@ -57,6 +58,7 @@ class VehicleReport:
     turns: CrossTrack
     touched: int
     hits: tuple[str, ...]
+    outside: float
     clearance: float | None
     clearance_time: float
     clearance_obstacle: str
@@ -176,6 +178,7 @@ def _vehicle(
         turns=_cross_track(cross[moving & trace.turning[:, i] & (cross > 0)]),
         touched=int(np.count_nonzero(contact & ~np.r_[False, contact[:-1]])),
         hits=swept.hits,
+        outside=excursion(mission.site, trace, i),
         clearance=float(swept.clearance) if np.isfinite(swept.clearance) else None,
         clearance_time=swept.time,
         clearance_obstacle=swept.obstacle,
@@ -220,6 +223,7 @@ def _figures(
         "tasks_served": len(tasks & set(served)),
         "finished": sum(v.finished for v in vehicles),
         "collisions": sum(v.touched > 0 or bool(v.hits) for v in vehicles),
+        "outside": max((v.outside for v in vehicles), default=0.0),
         "clearance": min(clear, default=None),
         "separation": min(apart, default=None),
         "legs_mean": legs.mean,
@@ -261,12 +265,14 @@ def _reasons(
     unserved = figures["tasks_planned"] - figures["tasks_served"]
     over("unserved", unserved, f"{unserved} of {figures['tasks_planned']} tasks not served")
     for vehicle, v in zip(mission.vehicles, vehicles, strict=True):
-        track = allowed["cross_track"]
-        track = vehicle.clearance / 2 if track is None else track
-        if v.legs.p95 > track > 0 or (track == 0 and allowed["cross_track"] == 0 and v.legs.p95 > 0):
+        margin = vehicle.clearance / 2 if vehicle.clearance > 0 else vehicle.model.width
+        track, fence = (margin if (limit := allowed[name]) is None else limit for name in ("cross_track", "outside"))
+        if v.legs.p95 > track:
             reasons.append(
-                f"{v.id}: 95 % of cross-track errors on straight legs up to {v.legs.p95:.2f} m, allowed {track:.2f} m"
+                f"{v.id}: off its straight legs by up to {v.legs.p95:.2f} m for 95 % of the way, allowed {track:.2f} m"
             )
+        if v.outside > fence:
+            reasons.append(f"{v.id}: {v.outside:.2f} m outside the operating area, allowed {fence:.2f} m")
         if v.clearance is not None and v.clearance < (allowed["clearance"] or 0.0):
             reasons.append(
                 f"{v.id}: {v.clearance:.2f} m from obstacle {v.clearance_obstacle!r} at {v.clearance_time:.0f} s"

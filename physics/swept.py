@@ -12,6 +12,7 @@ from quarterdeck.geo.scenario import Site, Vehicle
 from quarterdeck.physics.trace import Trace
 
 PIECE = 50  # samples of track tested at once
+EXACT = 0.001  # m
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +30,8 @@ class Swept:
 def sweep(site: Site, vehicle: Vehicle, trace: Trace, column: int) -> Swept:
     """Sweep the hull of the vehicle in `column` of the trace through the obstacles that block it.
 
-    Between two samples the hull covers the convex hull of its two rectangles. An aerial vehicle above an obstacle is
-    clear of it.
+    Between two poses the hull covers the convex hull of its two rectangles, to EXACT. An aerial vehicle above an obstacle
+    is clear of it.
     """
     obstacles = [o for o in site.obstacles if vehicle.domain in o.blocks]
     if not obstacles:
@@ -57,12 +58,12 @@ def sweep(site: Site, vehicle: Vehicle, trace: Trace, column: int) -> Swept:
     for piece, obstacle in zip(pieces[gap <= limit], nearest[gap <= limit], strict=True):
         first = firsts[piece]
         part = slice(first, first + PIECE + 1)
-        hulls = _hulls(xy[part], heading[part], vehicle.model.length, vehicle.model.width)
-        away = shapely.distance(hulls, polygons[obstacle])
-        away[z[part][: len(away)] > height[obstacle]] = np.inf
+        fine, turned, floor, parts = _refine(xy[part], heading[part], z[part], vehicle.model.length)
+        away = shapely.distance(_hulls(fine, turned, vehicle.model.length, vehicle.model.width), polygons[obstacle])
+        away[floor > height[obstacle]] = np.inf
         k = int(np.argmin(away))
         if away[k] < best[0]:
-            best = (float(away[k]), float(time[part][min(k + 1, len(time[part]) - 1)]), obstacles[obstacle].id)
+            best = (float(away[k]), float(time[part][min(k // parts + 1, len(time[part]) - 1)]), obstacles[obstacle].id)
         if away[k] == 0.0:
             hits.add(int(obstacle))
     return Swept(*best, tuple(obstacles[i].id for i in sorted(hits)))
@@ -79,6 +80,23 @@ def _nearest(
     return pairs[:, 0], pairs[:, 1], shapely.distance(lines[pairs[:, 0]], polygons[pairs[:, 1]])
 
 
+def _refine(
+    xy: np.ndarray, heading: np.ndarray, z: np.ndarray, length: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Return poses so close together that turning adds no more than EXACT to the hulls: places, headings, the least height
+    of each interval, and how many of them there are to one between samples.
+
+    The convex hull of a hull and itself turned by d reaches length * d / 4 too far amidships.
+    """
+    if len(xy) == 1:
+        return xy, heading, z, 1
+    turned = np.unwrap(heading)
+    parts = min(int(np.ceil(np.abs(np.diff(turned)).max() * length / 4 / EXACT)) or 1, 100)
+    at = np.linspace(0, len(xy) - 1, parts * (len(xy) - 1) + 1)
+    x, y, turned, z = (np.interp(at, np.arange(len(xy)), column) for column in (xy[:, 0], xy[:, 1], turned, z))
+    return np.column_stack([x, y]), turned, np.minimum(z[:-1], z[1:]), parts
+
+
 def _hulls(xy: np.ndarray, heading: np.ndarray, length: float, width: float) -> np.ndarray:
     """Return the (n - 1,) areas swept between n poses (n of 1: the hull itself)."""
     corners = np.array([(length, width), (-length, width), (-length, -width), (length, -width)]) / 2
@@ -88,6 +106,16 @@ def _hulls(xy: np.ndarray, heading: np.ndarray, length: float, width: float) -> 
     points = np.dstack([x, y])
     pairs = np.concatenate([points[:-1], points[1:]], axis=1) if len(points) > 1 else points
     return shapely.convex_hull(shapely.multipoints(pairs))
+
+
+def excursion(site: Site, trace: Trace, column: int) -> float:
+    """Return how far the track of the vehicle in `column` left the operating area, metres; 0 if never."""
+    track = np.column_stack([trace.x[:, column], trace.y[:, column]])
+    shapely.prepare(site.operating)
+    outside = ~shapely.intersects_xy(site.operating, track[:, 0], track[:, 1])
+    if not outside.any():
+        return 0.0
+    return float(shapely.distance(shapely.points(track[outside]), site.operating).max())
 
 
 @njit(cache=True)

@@ -133,8 +133,12 @@ def open_world(step: float) -> Iterator[World]:
             ) from None
         client = pybullet.connect(pybullet.DIRECT)
         pybullet.setPhysicsEngineParameter(
-            fixedTimeStep=step, numSubSteps=0, numSolverIterations=20, physicsClientId=client
-        )
+            fixedTimeStep=step,
+            numSubSteps=0,
+            numSolverIterations=20,
+            collisionFilterMode=0,
+            physicsClientId=client,
+        )  # collisionFilterMode 0: both masks must agree; by default one is enough
         pybullet.setGravity(0, 0, 0, physicsClientId=client)  # weight and lift are the models' business
     try:
         yield World(pybullet, client, step)

@@ -135,37 +135,25 @@ def _progress(title: str) -> Iterator[Callable[[float, float], None]]:
 
 def print_report(mission: Mission, report: Report) -> None:
     """Print the verdict and its figures on standard error."""
+    from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
     screen = console()
-    table = Table(title=f"{mission.name}: simulated", title_justify="left")
-    for column in (
-        "vehicle",
-        "time",
-        "planned",
-        "energy",
-        "planned",
-        "off legs 95 %",
-        "max",
-        "nearest obstacle",
-        "vehicle",
-    ):
-        table.add_column(column, justify="left" if column == "vehicle" and not table.columns else "right")
+    table = Table(title=f"{mission.name}: simulated", title_justify="left", box=SIMPLE_HEAD)
+    for column in ("vehicle", "time", "energy", "off track", "obstacle", "vehicle"):
+        table.add_column(column, justify="left" if not table.columns else "right", no_wrap=True)
     for v in report.vehicles[:60]:
         table.add_row(
             v.id,
-            minutes(v.time),
-            minutes(v.time_planned),
-            f"{v.energy:.1f} Wh",
-            f"{v.energy_planned:.1f} Wh",
+            f"{minutes(v.time)} {_change(v.time, v.time_planned)}",
+            f"{v.energy:.1f} Wh {_change(v.energy, v.energy_planned)}",
             f"{v.legs.p95:.2f} m",
-            f"{v.legs.max:.2f} m",
             "hit" if v.hits else _metres(v.clearance),
             _metres(v.separation),
         )
     screen.print(table)
     figures = report.figures
-    words = []
+    words = [f"off track {figures['legs_p95']:.2f} m (95 %, straight legs)"]
     if figures["coverage_planned"] is not None:
         words.append(f"coverage {figures['coverage_driven']:.2%} driven of {figures['coverage_planned']:.2%} planned")
     if figures["tasks_planned"]:
@@ -181,3 +169,7 @@ def print_report(mission: Mission, report: Report) -> None:
 
 def _metres(distance: float | None) -> str:
     return "" if distance is None else f"{distance:.1f} m"
+
+
+def _change(driven: float, planned: float) -> str:
+    return f"({(driven / planned - 1) * 100:+.1f} %)" if planned > 0 else ""
