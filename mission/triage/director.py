@@ -6,6 +6,7 @@ and `medic` that becomes events of the machines in `machines`, whose rows say wh
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import combinations
 from typing import Any
 
@@ -22,7 +23,8 @@ _EDGE = 2e-6  # m: what the world calls a meeting is in range here, whatever the
 def triage(team: Team, policy: Policy, settings: Settings) -> Director:
     """Return the director of a team.
 
-    Its events: `seen` by a UGV or medic (subject the casualty; data `x`, `y`, `sort` and, for medics, `category`), `met`
+    Its events: `seen` by a UGV or medic (subject the casualty; data `x`, `y`, `sort`, for medics
+    `category`, for robots `error`, how far off they take it to be), `met`
     (two in range), `served` (a medic's treatment is over), `lost` (data `kind`: stop, or mute: only the device failed).
     """
 
@@ -70,11 +72,13 @@ def _notice(desk: Desk, event: Event) -> None:
         return
     elif event.kind == "seen" and event.subject not in desk.tags:
         record = desk.agents[event.vehicle]
-        report = Report(event.subject, event.data["x"], event.data["y"], event.data["sort"], event.vehicle, desk.time)
+        data = event.data
+        report = Report(event.subject, data["x"], data["y"], data["sort"], event.vehicle, desk.time)
         if isinstance(record, Medic):
-            medic.saw(desk, event.vehicle, report, event.data["category"])
+            medic.saw(desk, event.vehicle, report, data["category"])
         elif isinstance(record, Ugv):
-            ugv.saw(desk, event.vehicle, report)
+            dx, dy = data.get("error", (0.0, 0.0))
+            ugv.saw(desk, event.vehicle, replace(report, x=report.x + dx, y=report.y + dy))
     elif event.kind == "served" and isinstance(desk.agents[event.vehicle], Medic):
         medic.treated(desk, event.vehicle, event.subject)
 

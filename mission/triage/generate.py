@@ -41,10 +41,15 @@ def _team(ugvs: int, uavs: int, medics: int, size: tuple[float, float], speeds: 
     width, height = size
     field = MultiPolygon([box(0, 0, width, height)])
     middle = (width / 2, height / 2)
-    rover, drone = load_model("husky"), load_model("survey-quad")
-    starts = [(round(width * (i + 0.5) / ugvs, 3), 0.0) for i in range(ugvs)]
-    vehicles = [Vehicle(f"ugv{i + 1}", rover, xy, speed=speeds[0], range=None) for i, xy in enumerate(starts)]
-    vehicles += [Vehicle(f"uav{i + 1}", drone, middle, speed=speeds[1], altitude=10.0) for i in range(uavs)]
+    rover, drone = load_model("triage-rover"), load_model("survey-quad")
+    starts = [(round(width * (i + 0.5) / ugvs, 3), min(1.0, height / 2)) for i in range(ugvs)]
+    vehicles = [
+        Vehicle(f"ugv{i + 1}", rover, xy, speed=speeds[0], clearance=rover.clearance) for i, xy in enumerate(starts)
+    ]
+    vehicles += [
+        Vehicle(f"uav{i + 1}", drone, middle, speed=speeds[1], altitude=10.0, clearance=drone.clearance)
+        for i in range(uavs)
+    ]
     return Scenario(
         name="triage",
         frame=_ORIGIN,

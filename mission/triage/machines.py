@@ -70,6 +70,8 @@ MEDIC = (
     Row("plan", "path planned", "walk to the first", "go"),
     Row("go", "casualty learnt", "plan the path", "plan"),
     Row("go", "arrived", "treat", "treat"),
+    Row("go", "arrived, nobody there", "look around", "go", extra=True),
+    Row("go", "looked around in vain", "strike it off", "plan", extra=True),
     Row("go", "arrived, already treated", "strike it off", "plan", extra=True),
     Row("treat", "casualty learnt", "plan the path", "treat"),
     Row("treat", "treated", "strike it off", "plan"),

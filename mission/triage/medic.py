@@ -1,12 +1,17 @@
 """The medic: idle, plan, go, treat (Fig. 5). His queue is planned anew at every new casualty, in the method's order."""
 
 import numpy as np
+from shapely import box
 
+from quarterdeck.geo.scenario import as_multipolygon
 from quarterdeck.mission.mission import Waypoint
 from quarterdeck.mission.priority_tsp import priority_order
+from quarterdeck.mission.triage.chase import expanding_square
 from quarterdeck.mission.triage.desk import Desk
 from quarterdeck.mission.triage.records import Belief, Medic, Report
 from quarterdeck.mission.triage.settings import RANK
+
+_LOOKS = 3  # times that he searches, each wider, around where a casualty was told to be
 
 
 def saw(desk: Desk, name: str, report: Report, category: str) -> None:
@@ -16,6 +21,12 @@ def saw(desk: Desk, name: str, report: Report, category: str) -> None:
     if report.id not in me.known:
         desk.note(name, "found", report.id)
         learn(desk, name, (report,))
+    elif any(r.id == report.id and (r.x, r.y) != (report.x, report.y) for r in me.queue):
+        queue = tuple(report if r.id == report.id else r for r in me.queue)
+        desk.change(name, queue=queue, heading_for="")  # a robot's word was off: now he sees where the casualty is
+        if me.state == "go":
+            desk.fire(name, "casualty learnt")
+        _plan(desk, name)
 
 
 def learn(desk: Desk, name: str, reports: tuple[Report, ...]) -> None:
@@ -41,11 +52,21 @@ def treated(desk: Desk, name: str, casualty: str) -> None:
 
 
 def arrived(desk: Desk, name: str) -> None:
-    """He stands at the casualty: somebody else may have treated it, which he sees; else he begins."""
+    """He stands where he was told: treats, unless somebody else has, which he sees; if nobody is there, he looks around."""
     me: Medic = desk.agents[name]
     if me.state != "go":
         return
     report = me.queue[0]
+    if report.id not in (me.examined or {}) and report.id not in desk.tags:
+        if me.looked < _LOOKS:
+            desk.fire(name, "arrived, nobody there")
+            desk.change(name, looked=me.looked + 1)
+            _look_around(desk, name, 4.0 ** (me.looked + 1))
+        else:
+            desk.fire(name, "looked around in vain")
+            desk.note(name, "not there", report.id)
+            _strike_off(desk, name, report.id)
+        return
     if report.id in desk.tags:
         desk.fire(name, "arrived, already treated")
         _strike_off(desk, name, report.id)
@@ -57,6 +78,16 @@ def arrived(desk: Desk, name: str) -> None:
     desk.change(name, treat_until=desk.time + seconds, heading_for="")
     x, y = desk.here(name)
     desk.send(name, [Waypoint(x, y, hold=seconds, task=report.id)])
+
+
+def _look_around(desk: Desk, name: str, sigmas: float) -> None:
+    """Search outwards from where the casualty was told to be."""
+    side = 2.0 * max(sigmas * desk.settings.position_error, desk.settings.medic_sees)
+    x, y = desk.here(name)
+    around = as_multipolygon(desk.team.foot.intersection(box(x - side / 2, y - side / 2, x + side / 2, y + side / 2)))
+    spacing = 1.8 * max(desk.settings.medic_sees, 0.1)
+    corners = expanding_square((x, y), around, spacing, desk.team.on_foot)
+    desk.drive(name, corners, _speed(desk, desk.agents[name]))
 
 
 def meets_medic(desk: Desk, one: str, other: str) -> None:
@@ -90,7 +121,7 @@ def _speed(desk: Desk, me: Medic) -> float:
 
 def _strike_off(desk: Desk, name: str, casualty: str) -> None:
     me: Medic = desk.agents[name]
-    desk.change(name, queue=tuple(r for r in me.queue if r.id != casualty), heading_for="")
+    desk.change(name, queue=tuple(r for r in me.queue if r.id != casualty), heading_for="", looked=0)
     _plan(desk, name)
 
 

@@ -54,7 +54,8 @@ class Fate:
 class Outcome:
     """A mission that has been run. `end` is when the last casualty was treated or the last UGV finished its search.
 
-    `reasons` say, one line each, what could not be done; there are none if all was searched, found and treated.
+    `reasons` say, one line each, what could not be done; there are none if all was searched, found and treated. `told` is
+    where the robots say that casualties are, which is off by their position error.
     """
 
     scenario: Scenario
@@ -67,6 +68,7 @@ class Outcome:
     run: Run
     end: float
     reasons: tuple[str, ...]
+    told: Mapping[str, tuple[float, float]]
 
 
 def run_triage(
@@ -101,7 +103,9 @@ def run_triage(
     fates = _fates(scenario, memory.log, {t.id: t.data for t in seen})
     searched = [e.time for e in memory.log if e.what == "state" and e.whom == "section searched"]
     end = max([0.0, *searched, *(f.treated for f in fates if f.treated is not None)])
-    return Outcome(scenario, method, settings, seed, team, fates, memory.log, run, end, _reasons(team, fates, memory, run))
+    told = {t.id: (t.x + t.data["error"][0], t.y + t.data["error"][1]) for t in seen}
+    reasons = _reasons(team, fates, memory, run)
+    return Outcome(scenario, method, settings, seed, team, fates, memory.log, run, end, reasons, told)
 
 
 def _fates(scenario: Scenario, log: Sequence[Entry], data: Mapping[str, Mapping[str, str]]) -> tuple[Fate, ...]:

@@ -81,7 +81,8 @@ class Uav:
 class Medic:
     """`queue` in the order of treatment, the first being walked to or treated, in treatment until `treat_until`.
 
-    `examined` is the category of whom he has seen, `walked` metres since the start, `last` where he last set out.
+    `examined` is the category of whom he has seen, `walked` metres since the start, `last` where he last set out,
+    `looked` how often he has searched around where the first of his queue should be.
     """
 
     state: str = "idle"
@@ -94,6 +95,7 @@ class Medic:
     treat_until: float = 0.0
     helpers: int = 0
     walked: float = 0.0
+    looked: int = 0
     last: XY = (0.0, 0.0)
     examined: Mapping[str, str] | None = None
 

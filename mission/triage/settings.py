@@ -30,7 +30,8 @@ class Settings:
     times before he is given up.
     Ideas that the paper only names: `order` of the medics (None: the method's own), `rendezvous` of the UAVs,
     `helpers` who shorten treatment (each green treated, at most this many, by `help_gain` each), `fatigue` the part of
-    the speed lost in 100 m walked (to half at the least). `confidence` is the probability that a robot sorts right.
+    the speed lost in 100 m walked (to half at the least). `confidence` is the probability that a robot sorts right,
+    `position_error` the standard deviation, each way, of where it says a casualty is.
     `knows_medic`: without a relay, the UGVs know at any time where the medics are and go.
     """
 
@@ -50,13 +51,14 @@ class Settings:
     help_gain: float = 0.25
     fatigue: float = 0.0
     confidence: float = 1.0
+    position_error: float = 0.0
     knows_medic: bool = True
 
     def __post_init__(self) -> None:
         for name in ("spacing", "ugv_sees", "medic_speed", "talk", "patience", "linger"):
             if not 0 < getattr(self, name) < inf:
                 raise InputError(f"{name} must be a number above 0, not {getattr(self, name)}")
-        for name in ("medic_sees", "help_gain", "fatigue"):
+        for name in ("medic_sees", "help_gain", "fatigue", "position_error"):
             if not 0 <= getattr(self, name) < inf:
                 raise InputError(f"{name} must be a number from 0, not {getattr(self, name)}")
         if set(self.treat) != set(COLOURS) or not all(0 <= s < inf for s in self.treat.values()):

@@ -6,6 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 from shapely import MultiPolygon, Point
+from shapely.ops import nearest_points
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Scenario, as_multipolygon
@@ -35,8 +36,8 @@ class Robot:
 
 @dataclass(frozen=True, slots=True)
 class Team:
-    """Who works on a site, and how they get about. `medics` are starts by id; `ground` and `air` are where
-    UGVs and UAVs may be.
+    """Who works on a site, and how they get about. `medics` are starts by id; `ground`, `foot`
+    and `air` are where UGVs, medics and UAVs may be.
 
     `distances` gives the medics' (n, n) metres between (n, 2) points; `on_ground`, `on_foot` and `in_air` shortest paths.
     """
@@ -46,6 +47,7 @@ class Team:
     medics: Mapping[str, XY]
     search: Search
     ground: MultiPolygon
+    foot: MultiPolygon
     air: MultiPolygon
     on_ground: Ways
     on_foot: Ways
@@ -107,6 +109,7 @@ def make_team(scenario: Scenario, method: str, settings: Settings) -> Team:
         medics=dict(scenario.medics),
         search=search,
         ground=ground,
+        foot=scenario.site.navigable("ground"),
         air=scenario.site.navigable("aerial"),
         on_ground=on_ground,
         on_foot=on_foot,
@@ -116,7 +119,11 @@ def make_team(scenario: Scenario, method: str, settings: Settings) -> Team:
 
 
 def targets(scenario: Scenario, settings: Settings, seed: int) -> list[Target]:
-    """Return the casualties: robots see `sort`, wrong with probability 1 - confidence; medics see `category`."""
+    """Return the casualties: robots see `sort`, at times wrong, and where they are off by `error`; medics see `category`.
+
+    A robot takes no casualty to be where nobody can stand: the error ends there.
+    """
+    foot = scenario.site.navigable("ground")
     rng = np.random.default_rng([seed, 0x5A17])
     sorts: tuple[Colour, ...] = ("red", "yellow", "green")
     made = []
@@ -124,7 +131,11 @@ def targets(scenario: Scenario, settings: Settings, seed: int) -> list[Target]:
         wrong, other = rng.random() >= settings.confidence, int(rng.integers(1, 3))
         sort = SORT[c.colour]
         seen = sorts[(sorts.index(sort) + other) % 3] if wrong else sort
-        made.append(Target(c.id, *c.position, {"sort": seen, "category": c.colour}))
+        error = rng.normal(0.0, 1.0, 2) * settings.position_error
+        if settings.position_error > 0:
+            told = nearest_points(foot, Point(np.array(c.position) + error))[0]
+            error = np.array([told.x, told.y]) - c.position
+        made.append(Target(c.id, *c.position, {"sort": seen, "category": c.colour, "error": tuple(error.tolist())}))
     return made
 
 

@@ -3,8 +3,11 @@
 from collections.abc import Sequence
 from itertools import pairwise
 
+from shapely import Point
+from shapely.ops import nearest_points
+
 from quarterdeck.mission.triage import medic, uav
-from quarterdeck.mission.triage.chase import chase, meeting_time, predict
+from quarterdeck.mission.triage.chase import chase, meeting_time, predict, straight
 from quarterdeck.mission.triage.desk import Desk
 from quarterdeck.mission.triage.records import XY, Report, Uav, Ugv
 
@@ -238,6 +241,10 @@ def _back(desk: Desk, name: str) -> None:
 
 
 def _drive_to(desk: Desk, name: str, place: XY) -> None:
+    """Drive to a casualty, or as near as clearance lets it."""
+    if desk.team.on_ground is not straight:
+        near = nearest_points(desk.team.ground, Point(place))[0]
+        place = (float(near.x), float(near.y))
     _drive(desk, name, desk.team.on_ground(desk.here(name), place))
 
 

@@ -15,6 +15,7 @@ VERBS = {
     "plan": "Cover an area.",
     "reproduce": "A paper's tables beside ours.",
     "simulate": "Execute a plan in PyBullet; report and verdict.",
+    "triage": "Search, relay, treat; the four methods.",
 }
 
 

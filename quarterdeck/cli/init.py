@@ -6,7 +6,13 @@ import click
 
 from quarterdeck.cli.output import emit, force_option, output_option
 
-SAMPLES = {"sea": "west_ant_island", "harbour": "dalian_harbour", "ground": "plant_yard", "air": "farm_survey"}
+SAMPLES = {
+    "sea": "west_ant_island",
+    "harbour": "dalian_harbour",
+    "ground": "plant_yard",
+    "air": "farm_survey",
+    "triage": "triage_drill",
+}
 
 
 @click.command(short_help="A small site to start from.")

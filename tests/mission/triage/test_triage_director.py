@@ -33,7 +33,9 @@ OPTIONS = st.sampled_from(
         Settings(rendezvous="round-robin"),
         Settings(order="nearest", helpers=2, fatigue=0.2),
         Settings(order="first-come", clusters=1),
-        Settings(confidence=0.7, medic_sees=0.0),
+        Settings(confidence=0.7, position_error=1.0),
+        Settings(position_error=4.0),
+        Settings(medic_sees=0.0),
         Settings(talk=6.0, ugv_sees=5.0),
     ]
 )
