@@ -117,17 +117,18 @@ def _with_rings(
     inset = shapely.simplify(inset, 5e-4)
     rings = [np.array(r.coords) for r in shapely.get_rings(shapely.get_parts(inset))]
     rest = shapely.difference(wanted, swath([np.vstack([p, p[:1]]) for p in paths], 1.0), grid_size=1e-6)
-    gains = [shapely.intersection(rest, swath([r], 1.0), grid_size=1e-6).area for r in rings]
-    length = sum(track_length(np.vstack([p, p[:1]])) for p in paths)
-    covered, paths, changed = wanted.area - rest.area, list(paths), False
+    swept = [swath([r], 1.0) for r in rings]
+    promise = [
+        shapely.intersection(rest, w, grid_size=1e-6).area / track_length(r) for r, w in zip(rings, swept, strict=True)
+    ]
+    paths, changed = list(paths), False
     for n in sorted(range(len(rings)), key=lambda n: -gains[n] / track_length(rings[n])):
-        added = track_length(rings[n])
-        if gains[n] < RING_PAYS * added or length + added > limit * (covered + gains[n]):
-            continue
-        spliced = _spliced(paths, rings[n], inner)
+        left = shapely.difference(rest, swept[n], grid_size=1e-6)
+        spliced = _spliced(paths, rings[n], inner) if rest.area - left.area >= RING_PAYS * track_length(rings[n]) else None
         if spliced is not None:
-            paths, changed = spliced, True
-            length, covered = length + added, covered + gains[n]
+            longer = sum(track_length(np.vstack([p, p[:1]])) for p in spliced)
+            if longer <= limit * (wanted.area - left.area):
+                paths, rest, changed = spliced, left, True
     return paths if changed else None
 
 

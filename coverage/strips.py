@@ -43,17 +43,23 @@ def grow(
     low = np.floor(bounds[:2]) - 2.0
     columns, rows = (int(n) for n in np.ceil(bounds[2:]) + 2.0 - low)
     walls = _bucket_edges(area_edges(space, 1.0) - np.tile(low, 2), rows, columns)
-    for _ in range(ROUNDS):
+    bounded = bool(np.isfinite(most_per_area))
+    kept, rest, budget = paths, None, np.inf
+    for _ in range(ROUNDS + 1):
         closed = [np.vstack([p, p[:1]]) for p in paths]
-        rest = shapely.difference(wanted, swath(closed, 1.0), grid_size=1e-6)
+        bare = shapely.difference(wanted, swath(closed, 1.0), grid_size=1e-6)
+        left = most_per_area * (wanted.area - bare.area) - sum(track_length(t) for t in closed) if bounded else np.inf
+        if left >= 0.0 or rest is None:
+            kept, rest, budget = paths, bare, left
+        else:  # changes that are close to each other covered less than foreseen: take fewer
+            least *= 1.5
         near = rest if rest.area < MANY else shapely.intersection(rest, swath(closed, 2.0 * DEPTH + 2.0))
-        budget = most_per_area * (wanted.area - rest.area) - sum(track_length(t) for t in closed)
         points = _points(near, low)
-        changes = _choose(paths, points, low, (rows, columns), walls, least, turn_cost, budget, most_per_area)
+        changes = _choose(kept, points, low, (rows, columns), walls, least, turn_cost, budget, most_per_area)
         if not any(changes):
-            break
-        paths = [_changed(p, c) for p, c in zip(paths, changes, strict=True)]
-    return paths
+            return kept
+        paths = [_changed(p, c) for p, c in zip(kept, changes, strict=True)]
+    return kept
 
 
 def _choose(
