@@ -118,9 +118,7 @@ def _with_rings(
     rings = [np.array(r.coords) for r in shapely.get_rings(shapely.get_parts(inset))]
     rest = shapely.difference(wanted, swath([np.vstack([p, p[:1]]) for p in paths], 1.0), grid_size=1e-6)
     swept = [swath([r], 1.0) for r in rings]
-    promise = [
-        shapely.intersection(rest, w, grid_size=1e-6).area / track_length(r) for r, w in zip(rings, swept, strict=True)
-    ]
+    gains = [shapely.intersection(rest, w, grid_size=1e-6).area for w in swept]
     paths, changed = list(paths), False
     for n in sorted(range(len(rings)), key=lambda n: -gains[n] / track_length(rings[n])):
         left = shapely.difference(rest, swept[n], grid_size=1e-6)
