@@ -53,7 +53,7 @@ class Annealing:
     t: float = 0.1
     t_min: float = 0.0005
     alpha: float = 0.9
-    k: int = 100
+    k: int = 200
     gamma: float = 0.5
     refined: int = 24
 

@@ -10,6 +10,8 @@ from shapely import LineString, MultiPolygon
 from quarterdeck.geo.dubins import CHORD, dubins_paths
 from quarterdeck.mission.mission import Leg
 
+REVERSAL = math.radians(150.0)  # a sharper bend is driven past, and come back to on a curve
+
 
 def with_turns(
     points: np.ndarray, legs: Sequence[Leg], radius: float, space: MultiPolygon
@@ -24,19 +26,20 @@ def with_turns(
     if radius <= 0 or len(points) < 3:
         return points, list(legs), []
     heading, bend, length = _bends(points)
-    tangent = radius * np.tan(np.minimum(np.abs(bend), math.pi - 1e-6) / 2)
+    reversal = np.abs(bend) > REVERSAL
+    tangent = np.where(reversal, 0.0, radius * np.tan(np.abs(bend) / 2))
     crowded = tangent[:-1] + tangent[1:] > length + 1e-9
     shapely.prepare(space)
     out, kinds, stuck = [points[0]], [legs[0]], []
     i = 1
     while i < len(points):
         last = i == len(points) - 1
-        if last or not (crowded[i - 1] or crowded[i]) or abs(bend[i]) < 1e-6:
+        if last or not (reversal[i] or crowded[i - 1] or crowded[i]) or abs(bend[i]) < 1e-6:
             out.append(points[i])
             kinds.append(legs[i])
             i += 1
             continue
-        j = i + 1 if crowded[i] and i + 2 < len(points) and abs(bend[i + 1]) > 1e-6 else i
+        j = i + 1 if crowded[i] and not reversal[i] and i + 2 < len(points) and abs(bend[i + 1]) > 1e-6 else i
         start, goal = (*points[i], heading[i - 1]), (*points[j], heading[j])
         curve = next((c for c in dubins_paths(start, goal, radius) if space.covers(LineString(c))), None)
         out.append(points[i])
@@ -57,8 +60,8 @@ def driven(points: np.ndarray, radius: float) -> np.ndarray:
     if radius <= 0 or len(points) < 3:
         return points
     heading, bend, length = _bends(points)
-    tangent = radius * np.tan(np.minimum(np.abs(bend), math.pi - 1e-6) / 2)
-    fits = np.ones(len(points), dtype=bool)
+    tangent = np.where(np.abs(bend) > REVERSAL, 0.0, radius * np.tan(np.abs(bend) / 2))
+    fits = np.abs(bend) <= REVERSAL
     fits[:-1] &= tangent[:-1] + tangent[1:] <= length + 1e-9
     fits[1:] &= tangent[:-1] + tangent[1:] <= length + 1e-9
     out = [points[:1]]
@@ -71,8 +74,9 @@ def driven(points: np.ndarray, radius: float) -> np.ndarray:
         angles = heading[i - 1] + np.linspace(0.0, bend[i], 1 + math.ceil(abs(bend[i]) / CHORD))
         centre = first + side * radius * np.array([-math.sin(heading[i - 1]), math.cos(heading[i - 1])])
         out.append(centre + side * radius * np.column_stack([np.sin(angles), -np.cos(angles)]))
-    out.append(points[-1:])
-    return np.concatenate(out)
+    line = np.concatenate([*out, points[-1:]])
+    apart = np.hypot(*np.diff(line, axis=0).T) > 1e-6  # arcs that touch meet in one point
+    return line[np.append(True, apart)]
 
 
 def _bends(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

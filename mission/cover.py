@@ -13,6 +13,7 @@ import shapely
 from shapely import MultiPolygon
 
 from quarterdeck.coverage.division import Division, distinct_entries, divide
+from quarterdeck.coverage.edge import Edge, lay_tracks
 from quarterdeck.coverage.metrics import measure, uncovered
 from quarterdeck.coverage.parts import allot, connected_parts, whole_targets
 from quarterdeck.coverage.placement import Method, place
@@ -36,12 +37,14 @@ def cover(
     seed: int = 0,
     placement: Method = "annealed",
     angle: float | None = None,
+    edge: Edge = "cells",
 ) -> Mission:
     """Return the mission that covers the scenario's areas with all its vehicles.
 
     `spacing` is metres between neighbouring tracks (the paper's 2 delta), `angle` fixes the lattice's direction in radians
-    counter-clockwise from east. Raises InputError if there is nothing to cover or nobody to cover it, or no spacing, or
-    the area holds no free cell at this spacing. What vehicles cannot do is told in the mission's `reasons`.
+    counter-clockwise from east, `edge` is how far tracks reach out to borders (`coverage.edge`). Raises InputError if
+    there is nothing to cover or nobody to cover it, or no spacing, or the area holds no free cell at this spacing. What
+    vehicles cannot do is told in the mission's `reasons`.
     """
     if not scenario.site.areas:
         raise InputError('no feature has the role "area"; draw what is to be covered')
@@ -50,18 +53,21 @@ def cover(
     shares(scenario.vehicles)  # wrong shares are refused before long work begins
     step = track_spacing(scenario, spacing)
     grid = place(trackable(scenario, step), step, seed=seed, method=placement, angle=angle).grid
-    return cover_grid(scenario, grid, seed=seed, parameters={"placement": placement})
+    return cover_grid(scenario, grid, edge=edge, seed=seed, parameters={"placement": placement})
 
 
-def cover_grid(scenario: Scenario, grid: Grid, *, seed: int = 0, parameters: Mapping[str, Any] | None = None) -> Mission:
+def cover_grid(
+    scenario: Scenario, grid: Grid, *, edge: Edge = "cells", seed: int = 0, parameters: Mapping[str, Any] | None = None
+) -> Mission:
     """Return the mission that covers the hypervertices of a placed grid; `parameters` are told in it beside the grid's."""
     vehicles, site, step = scenario.vehicles, scenario.site, grid.spacing
     parts_of_all = shares(vehicles)
     roads = _roadmaps(scenario)
     regions, notes = _regions(grid, vehicles, parts_of_all, roads, seed)
-    tracks = [[grid.centres(t) for t in region.tours] for region in regions]
+    laid = iter(lay_tracks(trackable(scenario, step), grid, [t for region in regions for t in region.tours], edge=edge))
+    tracks = [[next(laid) for _ in region.tours] for region in regions]
     routes, reasons = survey_routes(vehicles, tracks, roads)
-    figures = asdict(measure([np.vstack([t, t[:1]]) for own in tracks for t in own], site.coverable, grid))
+    figures = asdict(measure([t for own in tracks for t in own], site.coverable, grid))
     missed = uncovered(
         [t for v, r in zip(vehicles, routes, strict=True) for t in survey_tracks(v, r)], site.coverable, step
     )
@@ -71,7 +77,7 @@ def cover_grid(scenario: Scenario, grid: Grid, *, seed: int = 0, parameters: Map
         "hypervertices": int(grid.hypervertices.sum()),
         "makespan": max(r.duration for r in routes),
         "energy": sum(r.energy for r in routes),
-        "shares": cells / cells.sum(),
+        "shares": cells / max(1, cells.sum()),
         "notes": notes,
         "share_error_hypervertices": float(np.abs(cells - parts_of_all * cells.sum()).max()),
     }
@@ -82,7 +88,8 @@ def cover_grid(scenario: Scenario, grid: Grid, *, seed: int = 0, parameters: Map
         vehicles=vehicles,
         routes=routes,
         method="stc",
-        parameters={"spacing": step, "angle": grid.angle, "origin": list(grid.origin)} | dict(parameters or {}),
+        parameters={"spacing": step, "angle": grid.angle, "origin": list(grid.origin), "edge": edge}
+        | dict(parameters or {}),
         seed=seed,
         spacing=step,
         tasks=scenario.tasks,
@@ -168,6 +175,8 @@ def _regions(
     Returns the vehicles' regions, and notes on shares that could not be had.
     """
     free, k = grid.hypervertices, len(vehicles)
+    if not free.any():  # all is covered already, or all that is left has no room: everyone goes home
+        return [Region(np.zeros_like(free), [], 0)] * k, []
     numbers, count = connected_parts(free)
     sizes = np.bincount(numbers[free], minlength=count)
     counts = allot(sizes, whole_targets(int(sizes.sum()), parts_of_all), _distances(grid, numbers, count, vehicles, roads))

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
+from shapely import LineString, Point
+from shapely.ops import substring
 
 from quarterdeck.coverage.metrics import straight_pieces
 from quarterdeck.geo.scenario import Vehicle
@@ -42,27 +44,39 @@ def survey_routes(
 
 def _path(vehicle: Vehicle, tracks: Sequence[np.ndarray], road: Roadmap) -> tuple[np.ndarray, list[Leg], list[str]]:
     """Return (n, 2) metres along transits and closed tracks, nearest first, the kind of each leg, and what fails."""
-    points, legs, missing = [np.array([vehicle.start])], ["start"], []  # type: list[np.ndarray], list[Leg], list[str]
-    here, left = np.array(vehicle.start), list(tracks)
+    here, left, lines = Point(vehicle.start), list(tracks), []
     while left:
-        nearest = [int(((t - here) ** 2).sum(axis=1).argmin()) for t in left]
-        lengths, ways = shortest_paths(road, here, np.array([t[n] for t, n in zip(left, nearest, strict=True)]))
-        chosen = int(lengths[0].argmin())
-        track, entry, way = left.pop(chosen), nearest[chosen], ways[0][chosen]
+        nearest = min(range(len(left)), key=lambda i: here.distance(LineString(left[i])))
+        lines.append(_entered(left.pop(nearest), here))
+        here = Point(lines[-1][-1])
+    return linked(vehicle, lines, road)
+
+
+def _entered(track: np.ndarray, point: Point) -> np.ndarray:
+    """Return a closed (n, 2) track begun, and ended, where it is nearest to a point."""
+    line = LineString(track)
+    along = line.line_locate_point(point)
+    parts = [substring(line, along, line.length), substring(line, 0.0, along)]
+    return _straightened(np.concatenate([np.array(p.coords) for p in parts]))
+
+
+def linked(vehicle: Vehicle, lines: Sequence[np.ndarray], road: Roadmap) -> tuple[np.ndarray, list[Leg], list[str]]:
+    """Return (n, 2) metres from the start along survey lines (m, 2) in order and home, the kind of each leg, what fails."""
+    points, legs, missing = [np.array([vehicle.start])], ["start"], []  # type: list[np.ndarray], list[Leg], list[str]
+    for line in lines:
+        way = shortest_paths(road, points[-1][-1], line[0])[1][0][0]
         if way is None:
             missing.append(f"{vehicle.id}: no way from its start to its region; move the start, or lessen its clearance")
             continue
-        loop = _straightened(np.concatenate([track[entry:], track[:entry], track[entry : entry + 1]]))
-        points += [way[1:], loop[1:]]
+        points += [way[1:], line[1:]]
         legs.extend(["transit"] * (len(way) - 1))
-        legs.extend(["survey"] * (len(loop) - 1))
-        here = loop[-1]
-    way = shortest_paths(road, here, np.array(vehicle.home))[1][0][0]
+        legs.extend(["survey"] * (len(line) - 1))
+    way = shortest_paths(road, points[-1][-1], np.array(vehicle.home))[1][0][0]
     if way is None:
         missing.append(f"{vehicle.id}: no way from its region to its end; move the end, or lessen its clearance")
     elif len(points) > 1 or vehicle.home != vehicle.start:
         points.append(way[1:])
-        legs += ["transit"] * (len(way) - 1)
+        legs.extend(["transit"] * (len(way) - 1))
     return np.concatenate(points), legs, missing
 
 

@@ -5,8 +5,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import shapely
-from shapely import LineString, MultiPolygon
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.mission.director import Director, Event, State, fixed
@@ -151,8 +149,7 @@ class _Running:
         self.commands: dict[str, tuple[Waypoint, ...]] = {}
         self.told = np.zeros(self.count, int)
         self.done = False
-        rooms = {v.domain: _prepared(self.mission.site.navigable(v.domain)) for v in vehicles}
-        self.room = [rooms[v.domain] for v in vehicles]
+        self.slow, self.bias = np.full(self.count, np.inf), np.zeros(self.count)
         blocking = [o for o in self.mission.site.obstacles if o.blocks & {v.domain for v in vehicles}]
         self.world.add_obstacles(blocking)
         self.world.add_vehicles(vehicles, self.position, self.heading)
@@ -246,25 +243,10 @@ class _Running:
         for i in np.flatnonzero(underway != self.underway):
             self.world.set_underway(int(i), bool(underway[i]))
         self.underway = underway
-        self._keep_clear()
+        give_way(self.position, self.velocity, self.keep, ~self.moored & ~self.aground, self.slow, self.bias)
         for squad in self.squads:
+            squad.tracks["slow"], squad.tracks["bias"] = self.slow[squad.index], self.bias[squad.index]
             squad.active[:] = ~(self.moored | self.aground)[squad.index]
-
-    def _keep_clear(self) -> None:
-        """Have vehicles give way to one another; one that has no room to go aside stays on its path."""
-        slow, want, aside = np.empty(self.count), np.empty(self.count), self._gather("aside")
-        course = self._gather("course")
-        speed = np.hypot(self.velocity[:, 0], self.velocity[:, 1])
-        give_way(
-            self.position, course, speed, self._gather("pace"), aside, self.keep, ~self.moored & ~self.aground, slow, want
-        )
-        for i in np.flatnonzero(want > aside):
-            ahead = self.position[i, :2] + course[i] * speed[i] * 5.0
-            side = ahead + (want[i] - aside[i]) * np.array([course[i, 1], -course[i, 0]])
-            if not self.room[i].contains(LineString([self.position[i, :2], ahead, side])):
-                want[i] = aside[i]
-        for squad in self.squads:
-            squad.tracks["slow"], squad.tracks["want"] = slow[squad.index], want[squad.index]
 
     def _serve(self, reached: np.ndarray) -> tuple[Event, ...]:
         """Return an event for each task served since the last call."""
@@ -293,9 +275,9 @@ class _Running:
         return position, heading
 
     def _gather(self, name: str) -> np.ndarray:
-        """(k, ...) of a squad's property over the whole fleet."""
+        """(k,) of a squad's property over the whole fleet."""
         parts = [getattr(squad, name) for squad in self.squads]
-        out = np.empty((self.count, *parts[0].shape[1:]), parts[0].dtype)
+        out = np.empty(self.count, parts[0].dtype)
         for squad, part in zip(self.squads, parts, strict=True):
             out[squad.index] = part
         return out
@@ -307,12 +289,6 @@ class _Running:
             if place < len(squad.index) and squad.index[place] == i:
                 return squad, place
         raise KeyError(i)
-
-
-def _prepared(geometry: MultiPolygon) -> MultiPolygon:
-    """Return the geometry, made fast to ask about."""
-    shapely.prepare(geometry)
-    return geometry
 
 
 def _starts(mission: Mission, routes: Mapping[str, tuple[Waypoint, ...]]) -> tuple[np.ndarray, np.ndarray]:

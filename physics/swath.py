@@ -5,8 +5,8 @@ from collections.abc import Iterable
 import numpy as np
 import shapely
 from shapely import LineString
-from shapely.geometry.base import BaseGeometry
 
+from quarterdeck.coverage.metrics import uncovered
 from quarterdeck.geo.scenario import Site
 from quarterdeck.mission.mission import Route
 from quarterdeck.physics.paths import LEGS
@@ -22,8 +22,8 @@ def covered_fraction(site: Site, tracks: Iterable[LineString], spacing: float) -
     coverable = site.coverable
     if coverable.area == 0:
         return 0.0
-    swath: BaseGeometry = shapely.union_all([shapely.buffer(track, spacing / 2, quad_segs=8) for track in tracks])
-    return float(swath.intersection(coverable).area / coverable.area)
+    missed = uncovered([shapely.get_coordinates(track) for track in tracks], coverable, spacing)
+    return 1.0 - float(missed.area / coverable.area)
 
 
 def planned_tracks(routes: Iterable[Route]) -> list[LineString]:

@@ -16,6 +16,8 @@ from quarterdeck.cli.output import emit, force_option, output_option, print_figu
 @click.option("--placement", type=click.Choice(["annealed", "paper", "none"]), default="annealed", show_default=True,
               help="How the grid is placed: annealed, as the paper's Algorithm 1 is printed, or not.")  # fmt: skip
 @click.option("--angle", type=float, help="Fix the direction of the tracks: compass degrees.")
+@click.option("--edge", type=click.Choice(["whole", "cells", "lap"]), default="cells", show_default=True,
+              help="How far tracks reach: whole 2 x 2 cells, every free cell, or laps along borders too.")  # fmt: skip
 @seed_option
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on standard error instead of a table.")
 @force_option

@@ -13,12 +13,12 @@ SEA = MultiPolygon([box(-1000, -1000, 1000, 1000)])
 
 
 def curvature(points):
-    """Return the tightest radius of a polyline, from the chord and the bend at each point."""
+    """Return the tightest radius of a polyline, from the mean chord and the bend at each point."""
     step = np.diff(points, axis=0)
     size = np.hypot(*step.T)
     heading = np.arctan2(step[:, 1], step[:, 0])
     bend = np.abs((np.diff(heading) + math.pi) % math.tau - math.pi)
-    return float((np.minimum(size[:-1], size[1:]) / np.maximum(2 * np.sin(bend / 2), 1e-12)).min(initial=math.inf))
+    return float((0.5 * (size[:-1] + size[1:]) / np.maximum(2 * np.sin(bend / 2), 1e-12)).min(initial=math.inf))
 
 
 def test_wide_corners_stay():

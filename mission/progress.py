@@ -1,0 +1,80 @@
+"""What has happened of a mission so far: where everyone is, what is covered and served, what it has used."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from quarterdeck.geo.errors import InputError
+from quarterdeck.mission.mission import Mission, Route
+from quarterdeck.mission.timing import RESERVE
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """The state of a mission `time` seconds after its start.
+
+    `positions` are (x, y, z) metres by vehicle, `energy` watt-hours used by vehicle, `tracks` (n, 2) lines in metres along
+    which survey legs were driven, `served` the ids of tasks done.
+    """
+
+    time: float
+    positions: Mapping[str, tuple[float, float, float]]
+    energy: Mapping[str, float] = field(default_factory=dict)
+    tracks: tuple[np.ndarray, ...] = ()
+    served: frozenset[str] = frozenset()
+
+
+def planned_progress(mission: Mission, time: float, *, stopped: Mapping[str, float] | None = None) -> Progress:
+    """Return the progress at `time` if all went as planned, except that vehicles in `stopped` did nothing from then on.
+
+    Raises InputError if `time` is negative, or a vehicle in `stopped` is unknown.
+    """
+    if not time >= 0:
+        raise InputError(f"time {time:g} s must not be negative")
+    ends = {v.id: time for v in mission.vehicles}
+    for name, end in (stopped or {}).items():
+        if name not in ends:
+            raise InputError(f"unknown vehicle {name!r}; the plan has {', '.join(ends)}")
+        ends[name] = min(time, end)
+    positions, energy = {}, {}
+    tracks: list[np.ndarray] = []
+    served: set[str] = set()
+    for route in mission.routes:
+        vehicle = mission.vehicle(route.vehicle)
+        at = _place(route, ends[route.vehicle])
+        positions[vehicle.id] = at[1]
+        energy[vehicle.id] = route.energy * min(1.0, ends[vehicle.id] / route.duration) if route.duration else 0.0
+        tracks += _surveyed(route, *at)
+        served |= {w.task for w in route.waypoints if w.task and w.time + w.hold <= ends[vehicle.id]}
+    return Progress(time, positions, energy, tuple(tracks), frozenset(served))
+
+
+def _place(route: Route, time: float) -> tuple[int, tuple[float, float, float]]:
+    """Return the number of waypoints reached at `time`, and where the vehicle is."""
+    arrivals = np.array([w.time for w in route.waypoints])
+    departures = arrivals + np.array([w.hold for w in route.waypoints])
+    reached = int(np.searchsorted(arrivals, time, side="right"))
+    xyz = route.xyz
+    if reached == len(xyz) or time <= departures[reached - 1]:
+        x, y, z = xyz[reached - 1]
+    else:
+        part = (time - departures[reached - 1]) / (arrivals[reached] - departures[reached - 1])
+        x, y, z = xyz[reached - 1] + part * (xyz[reached] - xyz[reached - 1])
+    return reached, (float(x), float(y), float(z))
+
+
+def _surveyed(route: Route, reached: int, position: tuple[float, float, float]) -> list[np.ndarray]:
+    """Return the (n, 2) lines along which a route has surveyed when it stands at `position` after `reached` waypoints."""
+    points = np.vstack([route.xyz[:reached, :2], position[:2]])
+    survey = np.append(
+        route.survey[:reached], reached < len(route.waypoints) and route.survey[min(reached, len(route.survey) - 1)]
+    )
+    starts = np.flatnonzero(survey & ~np.roll(survey, 1)) - 1
+    ends = np.flatnonzero(survey & ~np.roll(survey, -1))
+    return [points[a : b + 1] for a, b in zip(starts, ends, strict=True)]
+
+
+def energy_left(battery: float, used: float) -> float:
+    """Return the watt-hours that planning may count on such that `RESERVE` of the whole battery is still kept."""
+    return max(0.0, battery - used / (1 - RESERVE))
