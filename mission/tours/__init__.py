@@ -1,0 +1,1 @@
+"""Tours: who visits which tasks, in which order and when, so that all are home soon and nothing urgent waits."""
