@@ -47,7 +47,10 @@ def multirotor_parameters(model: VehicleModel) -> np.ndarray:
     p["lag"], p["bandwidth"] = number(model, "lag", least=0.005), number(model, "bandwidth", least=1.0)
     p["drag"], p["drag2"] = numbers(model, "drag", 2, least=0.0)
     p["max_speed"], p["cruise"], p["exponent"] = model.max_speed, model.speed, model.power_exponent
-    p["idle"], p["watts"] = model.power_idle, model.power_cruise - model.power_idle
+    # Power goes with thrust to the power 3/2, and with speed so that level cruise takes the cruise figure.
+    drag = (p["drag"] + p["drag2"] * model.speed) * model.speed
+    load = np.hypot(1.0, drag / (p["mass"] * GRAVITY))
+    p["idle"], p["watts"] = model.power_idle, model.power_cruise / load**1.5 - model.power_idle
     if 4 * p["most"] < 1.2 * p["mass"] * GRAVITY:
         raise InputError(
             f"vehicle model {model.name!r}: [dynamics] four times thrust {p['most']} N is under 1.2 times the weight"

@@ -1,6 +1,6 @@
 """What tracks cover: the part of the area within half the track spacing of survey legs, planned or driven."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import shapely
@@ -15,15 +15,12 @@ from quarterdeck.physics.trace import Trace
 TOLERANCE = 0.02  # m: driven tracks are thinned by no more than this before they are widened
 
 
-def covered_fraction(site: Site, tracks: Iterable[LineString], spacing: float) -> float:
-    """Return the covered part of the coverable area, from 0 to 1, of `tracks` in metres; 0 where there is nothing to
-    cover.
-    """
+def covered_fraction(site: Site, tracks: Sequence[LineString], spacing: float) -> float:
+    """Return the covered part of the coverable area, from 0 to 1; 0 where there is nothing to cover."""
     coverable = site.coverable
-    if coverable.area == 0:
+    if coverable.area == 0 or not tracks:
         return 0.0
-    missed = uncovered([shapely.get_coordinates(track) for track in tracks], coverable, spacing)
-    return 1.0 - float(missed.area / coverable.area)
+    return float(1.0 - uncovered([shapely.get_coordinates(t) for t in tracks], coverable, spacing).area / coverable.area)
 
 
 def planned_tracks(routes: Iterable[Route]) -> list[LineString]:
@@ -33,11 +30,11 @@ def planned_tracks(routes: Iterable[Route]) -> list[LineString]:
 
 def driven_tracks(trace: Trace) -> list[LineString]:
     """Return what was driven on survey legs, thinned."""
-    lines = []
+    tracks: list[LineString] = []
     for i in range(len(trace.vehicles)):
         surveying = trace.kind[:, i] == LEGS.index("survey")
-        lines += _runs(np.column_stack([trace.x[:, i], trace.y[:, i]]), surveying)
-    return [shapely.simplify(line, TOLERANCE, preserve_topology=False) for line in lines]
+        tracks += _runs(np.column_stack([trace.x[:, i], trace.y[:, i]]), surveying)
+    return list(shapely.simplify(tracks, TOLERANCE, preserve_topology=False))
 
 
 def _runs(xy: np.ndarray, chosen: np.ndarray) -> list[LineString]:

@@ -146,7 +146,7 @@ def print_report(mission: Mission, report: Report) -> None:
         table.add_row(
             v.id,
             f"{minutes(v.time)} {_change(v.time, v.time_planned)}",
-            f"{v.energy:.1f} Wh {_change(v.energy, v.energy_planned)}",
+            f"{v.energy:,.{0 if v.energy >= 10 else 2}f} Wh {_change(v.energy, v.energy_planned)}",
             f"{v.legs.p95:.2f} m",
             "hit" if v.hits else _metres(v.clearance),
             _metres(v.separation),
@@ -172,4 +172,4 @@ def _metres(distance: float | None) -> str:
 
 
 def _change(driven: float, planned: float) -> str:
-    return f"({(driven / planned - 1) * 100:+.1f} %)" if planned > 0 else ""
+    return f"{(driven / planned - 1) * 100:+.1f} %" if planned > 0 else ""
