@@ -1,22 +1,25 @@
 """Coverage by robots of limited visibility: guards, tours past them, and the proof that all is seen."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
 import shapely
+from shapely import MultiPolygon
 
 from quarterdeck.coverage.cst import constrained_tour
+from quarterdeck.coverage.guards.bound import guards_bound
 from quarterdeck.coverage.guards.certificate import TOLERANCE, mend, uncovered
+from quarterdeck.coverage.guards.fewer import fewer_guards
 from quarterdeck.coverage.guards.pieces import paper_guards
 from quarterdeck.coverage.guards.space import Space, space_of
 from quarterdeck.coverage.network import Network, network
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.geodesics import geodesics
 from quarterdeck.geo.scenario import Scenario, Vehicle, as_multipolygon
-from quarterdeck.geo.triangulation import triangulate
+from quarterdeck.geo.triangulation import Triangulation, triangulate
 from quarterdeck.geo.visibility import visibility_polygons
 from quarterdeck.mission.guard_tours import improve_tours, makespan_bound, tour_times
 from quarterdeck.mission.mission import Layer, Leg, Mission, Route
@@ -57,10 +60,10 @@ def plan_guards(scenario: Scenario, *, range: float | None = None, mode: Mode = 
     space, starts, homes = _entered(space_of(scenario), scenario.vehicles)
     mesh = triangulate(space.sight)
     guards, unseen = mend(space, mesh, paper_guards(space, reach), reach)
-    paper = paper_tours(space, guards, starts, homes, scenario.vehicles)
-    tours = paper if mode == "paper" else shorter_tours(space, paper, starts, homes, scenario.vehicles, seed=seed)
-    views = visibility_polygons(mesh, tours.guards, reach)
-    rest = uncovered(space, views)
+    robots = (starts, homes, scenario.vehicles)
+    paper = paper_tours(space, guards, *robots)
+    tours = paper if mode == "paper" else _optimised(space, unseen, mesh, paper, *robots, reach=reach, seed=seed)
+    rest = uncovered(space, visibility_polygons(mesh, tours.guards, reach))
     reasons = [] if unseen.is_empty else [f"{unseen.area:.6g} m2 cannot be seen from where the vehicles may be"]
     routes = [_route(v, tours, i) for i, v in enumerate(scenario.vehicles)]
     reasons += [line for v, route in zip(scenario.vehicles, routes, strict=True) for line in shortfalls(v, route)]
@@ -71,7 +74,7 @@ def plan_guards(scenario: Scenario, *, range: float | None = None, mode: Mode = 
         "duration": max(r.duration for r in routes),
         "length": sum(r.length for r in routes),
         "area": space.target.area,
-        "paper": {"guards": len(paper.guards), "makespan": paper.makespan},
+        "paper": {"guards": len(paper.guards), "makespan": paper.makespan, "bound": paper.bound},
         "certificate": {
             "uncovered": float(rest.area),
             "tolerance": TOLERANCE,
@@ -90,11 +93,36 @@ def plan_guards(scenario: Scenario, *, range: float | None = None, mode: Mode = 
         tasks=scenario.tasks,
         casualties=scenario.casualties,
         figures=figures,
-        bounds={"makespan": tours.bound},
+        bounds={"makespan": tours.bound, "guards": guards_bound(_less(space, unseen), mesh, reach, seed=seed)},
         reasons=tuple(reasons),
         layers=_layers(tours, scenario.vehicles, reach),
         input_hash=scenario.input_hash,
     )
+
+
+def _optimised(
+    space: Space,
+    unseen: MultiPolygon,
+    mesh: Triangulation,
+    paper: Tours,
+    starts: np.ndarray,
+    homes: np.ndarray,
+    vehicles: Sequence[Vehicle],
+    *,
+    reach: float,
+    seed: int,
+) -> Tours:
+    """Return tours past few guards; past the paper's own where those would not be shorter than the paper's."""
+    few = fewer_guards(_less(space, unseen), mesh, paper.guards, reach, seed=seed)
+    tours = shorter_tours(space, paper_tours(space, few, starts, homes, vehicles), starts, homes, vehicles, seed=seed)
+    if tours.makespan <= paper.makespan:
+        return tours
+    return shorter_tours(space, paper, starts, homes, vehicles, seed=seed)
+
+
+def _less(space: Space, unseen: MultiPolygon) -> Space:
+    """Return the space whose target is what can be seen."""
+    return space if unseen.is_empty else replace(space, target=as_multipolygon(space.target.difference(unseen)))
 
 
 def _range(vehicles: Sequence[Vehicle], default: float | None) -> float:
