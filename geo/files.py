@@ -1,7 +1,10 @@
-"""Writing files: beside, then renamed, so that none is ever half written."""
+"""Writing files: beside, then renamed, so that none is ever half written; and names that are safe for files."""
 
 import os
+import re
 import tempfile
+import unicodedata
+from collections.abc import Iterable
 from pathlib import Path
 
 from quarterdeck.geo.errors import InputError
@@ -31,3 +34,31 @@ def write_file(path: Path, content: bytes | str, *, force: bool = False) -> Path
         Path(beside).unlink(missing_ok=True)
         raise InputError(f"{path} cannot be written ({error.strerror or error}); choose another place with -o") from None
     return path
+
+
+def safe_names(names: Iterable[str]) -> dict[str, str]:
+    """Return a file name's stem for each name: letters and digits of any script, `-`, `_` and `.`, no two alike.
+
+    Names that only differ in what cannot stand in a file name, or in case, are numbered. A name stays within 100 bytes and
+    is none that Windows reserves.
+    """
+    taken: set[str] = set()
+    stems: dict[str, str] = {}
+    for name in names:
+        stem = plain = _stem(name)
+        number = 1
+        while stem.casefold() in taken:
+            number += 1
+            stem = f"{plain}-{number}"
+        taken.add(stem.casefold())
+        stems[name] = stem
+    return stems
+
+
+_RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+
+
+def _stem(name: str) -> str:
+    stem = re.sub(r"[^\w.-]+", "_", unicodedata.normalize("NFC", name)).strip("._-")
+    stem = stem.encode("utf-8")[:100].decode("utf-8", "ignore").rstrip("._-") or "unnamed"
+    return f"_{stem}" if _RESERVED.fullmatch(stem) else stem

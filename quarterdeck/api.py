@@ -3,6 +3,7 @@
 Each stage is imported when it is first called, so that importing the package costs nothing.
 """
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal
 
@@ -11,7 +12,7 @@ from quarterdeck.geo.scenario import Scenario
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.planfile import plan_text, read_plan
 
-__all__ = ["plan", "plan_text", "read_plan", "read_scenario", "simulate", "write_plan"]
+__all__ = ["export", "plan", "plan_text", "read_plan", "read_scenario", "simulate", "write_plan"]
 
 
 def plan(scenario: Scenario, *, method: Literal["stc"] = "stc", seed: int = 0, **options: Any) -> Mission:
@@ -30,6 +31,13 @@ def simulate(mission: Mission, **options: Any) -> Any:
     from quarterdeck.physics.simulate import simulate as run
 
     return run(mission, **options)
+
+
+def export(mission: Mission, to: str | Iterable[str], out: str | Path, **options: Any) -> list[Path]:
+    """Write a mission in other formats into a folder and return the paths (`quarterdeck.exporters.export.export`)."""
+    from quarterdeck.exporters.export import export as leave
+
+    return leave(mission, to, out, **options)
 
 
 def write_plan(mission: Mission, path: str | Path, *, force: bool = False) -> Path:

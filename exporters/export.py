@@ -1,0 +1,77 @@
+"""How a mission leaves: one registry of formats, one function that writes them.
+
+An exporter is a module with `files(mission, settings, **options)`, which returns the content of each file by its name and
+writes nothing. So an export is whole or not at all: every file is made and every name checked before one is written.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from difflib import get_close_matches
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Literal
+
+from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.files import write_file
+from quarterdeck.mission.mission import Mission
+
+Autopilot = Literal["ardupilot", "px4"]
+AUTOPILOTS: tuple[Autopilot, ...] = ("ardupilot", "px4")
+
+# format: (module, its options, what it is)
+FORMATS: dict[str, tuple[str, dict[str, Any], str]] = {
+    "geojson": ("geojson", {}, "styled routes and site for geojson.io, GitHub, QGIS"),
+    "png": ("picture", {}, "map of the plan"),
+    "qgc-wpl": ("qgc_wpl", {}, "mission, fence and rally files for ArduPilot, PX4, Mission Planner, QGroundControl"),
+    "rerun": ("recording", {}, "recording for the rerun viewer"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What an export is for: the `autopilot`, and `tell`, called with a line for what the user should know."""
+
+    autopilot: Autopilot = "ardupilot"
+    tell: Callable[[str], None] = lambda _line: None
+
+
+def export(
+    mission: Mission,
+    to: str | Iterable[str],
+    out: str | Path,
+    *,
+    autopilot: str = "ardupilot",
+    force: bool = False,
+    tell: Callable[[str], None] | None = None,
+) -> list[Path]:
+    """Write `mission` in each of the formats `to` (names of `FORMATS`) into the folder `out`; return the files' paths.
+
+    `tell` is called with one line for each limit that the mission meets in a format. Raises InputError, and writes nothing,
+    for an unknown format or autopilot, for two formats that would write the same file, and where a file stands already
+    and not `force`.
+    """
+    names = [to] if isinstance(to, str) else list(to)
+    if autopilot not in AUTOPILOTS:
+        raise InputError(f"unknown autopilot {autopilot!r}; known: {', '.join(AUTOPILOTS)}")
+    settings = Settings(autopilot, tell or (lambda _line: None))
+    made: dict[str, bytes | str] = {}
+    for name in dict.fromkeys(names):
+        module, options, _ = _format(name)
+        for file, content in import_module(f"quarterdeck.exporters.{module}").files(mission, settings, **options).items():
+            if file in made:
+                raise InputError(f"{name} and another of the formats both write {file}; export them to different folders")
+            made[file] = content
+    folder = Path(out)
+    paths = [folder / file for file in made]
+    standing = [path for path in paths if path.exists()]
+    if standing and not force:
+        raise InputError(f"{standing[0]} exists; give --force to overwrite it, or another folder with -o")
+    return [write_file(path, content, force=force) for path, content in zip(paths, made.values(), strict=True)]
+
+
+def _format(name: str) -> tuple[str, dict[str, Any], str]:
+    if name not in FORMATS:
+        near = get_close_matches(name, FORMATS, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(sorted(FORMATS))}"
+        raise InputError(f"unknown format {name!r}; {hint}")
+    return FORMATS[name]

@@ -1,0 +1,31 @@
+"""`quarterdeck export`: a plan as files that autopilots, charts and people read."""
+
+from pathlib import Path
+
+import click
+
+from quarterdeck.cli.output import force_option
+
+
+@click.command(short_help="Autopilot and ECDIS files, recording, pictures.")
+@click.argument("plan")
+@click.option("--to", "formats", required=True, help="Formats parted by commas, such as qgc-wpl,png; or all.")
+@click.option("-o", "--out", default=".", show_default=True, help="The folder to write into.")
+@click.option("--autopilot", default="ardupilot", show_default=True, help="Whom mission files are for: ardupilot or px4.")
+@force_option
+def command(plan: str, formats: str, out: str, autopilot: str, force: bool) -> None:
+    """Write PLAN (a file, or - for standard input) in other formats; print the paths of the files, one a line.
+
+    Every format and what it can't carry: docs/exports.md. A format that is not known is answered with the list.
+    """
+    from quarterdeck.exporters.export import FORMATS, export
+    from quarterdeck.mission.planfile import read_plan
+
+    names = list(FORMATS) if formats == "all" else [name.strip() for name in formats.split(",") if name.strip()]
+    mission = read_plan(plan)
+    for path in export(mission, names, Path(out), autopilot=autopilot, force=force, tell=_note):
+        click.echo(path)
+
+
+def _note(line: str) -> None:
+    click.echo(f"note: {line}", err=True)

@@ -1,0 +1,77 @@
+"""The one door: registry, names, refusal before anything is written."""
+
+import json
+
+import pytest
+
+from quarterdeck.exporters.export import FORMATS, export
+from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.files import safe_names
+
+
+@pytest.mark.parametrize("make", ["boats", "quads", "ugv"])
+def test_every_mission_leaves_in_every_format(make, request, tmp_path):
+    """A fleet of boats, a camera survey and an inspection are written in all formats, no file empty."""
+    mission = request.getfixturevalue(make)
+    paths = export(mission, FORMATS, tmp_path)
+    assert all(path.stat().st_size > 0 for path in paths)
+    assert len(set(paths)) == len(paths)
+
+
+def test_same_mission_gives_the_same_bytes(boats, tmp_path):
+    """Exports hold no clock and no chance; rerun's recordings are compared by rerun's own tool elsewhere."""
+    names = [name for name in FORMATS if name != "rerun"]
+    first, second = export(boats, names, tmp_path / "a"), export(boats, names, tmp_path / "b")
+    assert [p.read_bytes() for p in first] == [p.read_bytes() for p in second]
+
+
+def test_nothing_is_written_where_a_file_stands(boats, tmp_path):
+    """An existing file stops the whole export before it writes; --force does not."""
+    (tmp_path / "usv3.waypoints").write_text("mine")
+    with pytest.raises(InputError, match=r"usv3\.waypoints exists"):
+        export(boats, "qgc-wpl", tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["usv3.waypoints"]
+    export(boats, "qgc-wpl", tmp_path, force=True)
+    assert (tmp_path / "usv3.waypoints").read_text().startswith("QGC")
+
+
+def test_unknown_names_are_answered_with_the_nearest(boats, tmp_path):
+    """A misspelt format or autopilot is refused in one line."""
+    with pytest.raises(InputError, match="did you mean 'qgc-wpl'"):
+        export(boats, "qgcwpl", tmp_path)
+    with pytest.raises(InputError, match="unknown autopilot"):
+        export(boats, "qgc-wpl", tmp_path, autopilot="apm")
+
+
+HOSTILE = ["../../etc/passwd", "a/b", "a_b", "A_B", "CON", "船 1", "..", "x" * 300, "a\nb\0c", "é", "e\u0301", ""]
+
+
+def test_hostile_names_make_safe_and_different_files(make_fleet, tmp_path):
+    """No name leaves the folder, is reserved, too long, or the same as another's."""
+    out = tmp_path / "out"
+    mission = make_fleet(len(HOSTILE), names=HOSTILE)
+    paths = export(mission, [name for name in FORMATS if name not in ("png", "rerun")], out)
+    assert {p.resolve().parent for p in paths} == {out.resolve()}
+    assert all(len(p.name.encode()) < 200 for p in paths)
+    stems = list(safe_names(HOSTILE).values())
+    assert len({s.casefold() for s in stems}) == len(HOSTILE)
+    assert stems[5] == "船_1"
+    assert stems[4] != "CON"
+
+
+def test_geojson_is_styled_and_split_at_the_antimeridian(make_fleet, tmp_path):
+    """Lines carry simplestyle strokes; across 180 degrees they are cut, never drawn round the world."""
+    from quarterdeck.geo.frame import Frame
+
+    (path,) = export(make_fleet(1, Frame(179.9995, -17.0)), "geojson", tmp_path)
+    features = json.loads(path.read_text())["features"]
+    lines = [f for f in features if "LineString" in f["geometry"]["type"]]
+    assert lines
+    assert all(f["properties"]["stroke"].startswith("#") for f in lines)
+    for f in lines:
+        parts = (
+            f["geometry"]["coordinates"] if f["geometry"]["type"] == "MultiLineString" else [f["geometry"]["coordinates"]]
+        )
+        for part in parts:
+            longitudes = [position[0] for position in part]
+            assert max(longitudes) - min(longitudes) < 1.0
