@@ -59,6 +59,26 @@ def find_problems(source: str | Path) -> list[str]:
         return [str(error)]
 
 
+def read_obstacles(source: str | Path, frame: Frame) -> tuple[Obstacle, ...]:
+    """Return the obstacles in a GeoJSON file, whatever else is in it, in metres of `frame`.
+
+    Raises InputError as `read_scenario` does, and if there are none.
+    """
+    name, problems = "standard input" if str(source) == "-" else str(source), list[str]()
+    try:
+        document = parse(read_bytes(source))
+        features = [f for i, raw in enumerate(document["features"]) if (f := _feature(i, raw, problems))]
+        features = [f for f in features if f["role"] == "obstacle"]
+        shapes = _shapes(features, frame, problems) if not problems else {}
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
+    if not problems and not features:
+        problems.append('no feature has the role "obstacle"')
+    if problems:
+        raise InputError(f"{name}: {problems[0]}")
+    return tuple(Obstacle(*part) for f in features for part in _obstacle_parts(f, shapes[f["place"]]))
+
+
 def read_bytes(source: str | Path) -> bytes:
     """Return the bytes of a file, or of standard input for `-`. Raises InputError if it cannot be read."""
     if str(source) == "-":

@@ -12,7 +12,7 @@ from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.mission import Waypoint
 from quarterdeck.physics import multirotor, rover, vessel
 from quarterdeck.physics.guidance import guide_multirotors, guide_rovers, guide_vessels
-from quarterdeck.physics.paths import IDLE, WAYPOINT, command_track, empty_tracks, vehicle_limits
+from quarterdeck.physics.paths import IDLE, ROTATE, SAIL, WAYPOINT, command_track, empty_tracks, vehicle_limits
 
 
 class Squad(ABC):
@@ -56,6 +56,25 @@ class Squad(ABC):
         """(k,) number of waypoints of the last command that were reached and served."""
         t = self.tracks
         return np.where(self.idle, t["last"] - t["first"], np.maximum(t["leg"] - t["first"] - 1, 0))
+
+    @property
+    def course(self) -> np.ndarray:
+        """(k, 2) direction of the leg that each is on; zeros for one that waits, holds or is done."""
+        t = self.tracks
+        a, b = self.table[np.maximum(t["leg"] - 1, t["first"])], self.table[t["leg"]]
+        way = np.column_stack([b["x"] - a["x"], b["y"] - a["y"]])
+        length = np.hypot(*way.T)
+        return way / np.where((length > 0) & ((t["mode"] == SAIL) | (t["mode"] == ROTATE)), length, np.inf)[:, None]
+
+    @property
+    def pace(self) -> np.ndarray:
+        """(k,) m/s at which each is to go on its leg."""
+        return self.table["speed"][self.tracks["leg"]]
+
+    @property
+    def aside(self) -> np.ndarray:
+        """(k,) metres that each has moved to starboard of its path to keep clear of others."""
+        return self.tracks["aside"]
 
     @abstractmethod
     def figures(self, vehicle: Vehicle) -> np.ndarray:
@@ -154,7 +173,7 @@ class Rovers(Squad):
     def guide(self, time: float, step: float) -> None:
         speed = self.state[:, [rover.LEFT, rover.RIGHT]].mean(axis=1)
         guide_rovers(
-            time, self.state[:, :3] + self.error, speed, self.limits, self.tracks, self.table, self.speed, self.turn
+            time, step, self.state[:, :3] + self.error, speed, self.limits, self.tracks, self.table, self.speed, self.turn
         )
 
     def drive(self, step: float, current: np.ndarray, wind: np.ndarray) -> None:

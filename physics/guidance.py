@@ -58,13 +58,15 @@ def guide_vessels(
             wanted = min(table[t.leg].speed, t.slow)
             if _stops(t, table, time):
                 wanted = min(wanted, max(np.sqrt(2 * 0.5 * lim.accel * max(remaining - ARRIVED / 2, 0.0)), 0.2))
+            _step_aside(t, lim, step)
             ahead = max(2.5 * lim.length, 1.5 * lim.speed)
+            t.cross, t.turning = cross, along < lim.zone or remaining < lim.zone or t.aside > 0
+            cross += t.aside
             kappa = 0.05 * lim.speed
             if abs(cross) < 2 * ahead and wanted > 0.1:
                 t.integral += step * ahead * cross / (ahead**2 + (cross + kappa * t.integral) ** 2)
-            course = np.arctan2(ty, tx) - np.arctan2(cross + kappa * t.integral, ahead) + t.bias
+            course = np.arctan2(ty, tx) - np.arctan2(cross + kappa * t.integral, ahead)
             wx, wy = wanted * np.cos(course) - t.driftx, wanted * np.sin(course) - t.drifty
-            t.cross, t.turning = cross, along < lim.zone or remaining < lim.zone
         else:
             px, py = table[t.leg].x - x, table[t.leg].y - y
             away = np.hypot(px, py)
@@ -81,6 +83,7 @@ def guide_vessels(
 @njit(cache=True)
 def guide_rovers(
     time: float,
+    step: float,
     pose: np.ndarray,
     velocity: np.ndarray,
     limits: np.ndarray,
@@ -116,7 +119,9 @@ def guide_rovers(
             t.cross, t.turning = 0.0, True
             continue
         tx, ty, length, along, cross = _leg(t, table, x, y)
-        t.cross, t.turning = cross, along < lim.zone or length - along < lim.zone
+        _step_aside(t, lim, step)
+        t.cross, t.turning = cross, along < lim.zone or length - along < lim.zone or t.aside > 0
+        cross += t.aside
         if t.mode == ROTATE:
             error = _wrap(np.arctan2(ty, tx) - psi)
             if abs(error) < 0.02 or length < near:
@@ -185,14 +190,24 @@ def guide_multirotors(
             reference[i, 3], reference[i, 4], reference[i, 5] = v * dx, v * dy, v * dz
             if np.hypot(dx, dy) > 0.1:
                 reference[i, 6] = np.arctan2(dy, dx)
+                _step_aside(t, lim, step)
+                reference[i, 0] += t.aside * dy / np.hypot(dx, dy)
+                reference[i, 1] -= t.aside * dx / np.hypot(dx, dy)
             px, py, pz = position[i, 0] - a.x, position[i, 1] - a.y, position[i, 2] - a.z
             along = (px * dx + py * dy + pz * dz) / length
             t.cross = np.sqrt(max(px * px + py * py + pz * pz - along * along, 0.0))
-            t.turning = along < lim.zone or length - along < lim.zone
+            t.turning = along < lim.zone or length - along < lim.zone or t.aside > 0
         else:
             reference[i, 0], reference[i, 1], reference[i, 2] = b.x, b.y, b.z
             reference[i, 3] = reference[i, 4] = reference[i, 5] = 0.0
             t.cross, t.turning = 0.0, True
+
+
+@njit(cache=True)
+def _step_aside(t: Any, lim: Any, step: float) -> None:
+    """Move towards the offset that separation wants, a third as fast as the vehicle goes."""
+    most = 0.33 * lim.speed * step
+    t.aside += min(max(t.want - t.aside, -most), most)
 
 
 @njit(cache=True)

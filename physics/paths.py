@@ -17,11 +17,15 @@ WAYPOINT = np.dtype(
 )
 
 # `first` is the row of the place where the vehicle was when told, `last` of its last waypoint, `leg` of the one made for;
-# `slow` is the speed that separation allows, `bias` by how many radians it turns the course.
+# `slow` is the speed that separation allows, `want` how far to starboard of the path it wants the vehicle, `aside` how far
+# it is there; `bias` is the angle, radians, that the potential field adds to a rover's course.
 TRACK = np.dtype(
     [(n, np.int64) for n in ("first", "last", "leg")]
     + [("mode", np.int8)]
-    + [(n, float) for n in ("until", "integral", "driftx", "drifty", "reach", "pace", "slow", "bias", "cross")]
+    + [
+        (n, float)
+        for n in ("until", "integral", "driftx", "drifty", "reach", "pace", "slow", "want", "aside", "bias", "cross")
+    ]
     + [("turning", np.bool_)]
 )
 

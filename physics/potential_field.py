@@ -31,7 +31,7 @@ class FieldParams:
 
 
 PAPER = FieldParams(attraction=0.3, obstacles=1.0, robots=1.0, influence=1.0, swirl=0.0, scaled=False)
-SCALED = FieldParams(attraction=1.0, obstacles=0.5, robots=0.5, influence=1.5, swirl=0.7, scaled=True)
+SCALED = FieldParams(attraction=1.0, obstacles=0.5, robots=0.5, influence=1.5, swirl=1.0, scaled=True)
 
 
 def field_velocity(
@@ -121,14 +121,21 @@ def _velocities(
         gx, gy = gx / away, gy / away
         pull = attraction * min(1.0, away) * (speed[k] if scaled else 1.0)
         vx, vy = pull * gx, pull * gy
-        near, least = -1, np.inf
+        near, least, lean = -1, np.inf, 0.0
+        for b in range(len(angles)):  # on which side most of what is in the way stands: all of it is passed on the other
+            d = ranges[k, b] - keep[k, b]
+            if scaled and d < influence:
+                ux, uy = np.cos(pose[k, 2] + angles[b]), np.sin(pose[k, 2] + angles[b])
+                if ux * gx + uy * gy > 0:
+                    lean += np.sign(uy * gx - ux * gy) * (1 / max(d, NEAREST) - 1 / influence)
+        side = 1.0 if lean < 0 else -1.0
         for b in range(len(angles)):
             d = ranges[k, b] - keep[k, b]
             if d < least:
                 near, least = b, d
             if scaled and d < influence:
                 ux, uy = np.cos(pose[k, 2] + angles[b]), np.sin(pose[k, 2] + angles[b])
-                fx, fy = _push(ux, uy, d, gx, gy, away, influence, swirl, True)
+                fx, fy = _push(ux, uy, d, gx, gy, away, influence, swirl * side, True)
                 vx, vy = vx + obstacles * width * fx, vy + obstacles * width * fy
         if not scaled and least < influence:
             ux, uy = np.cos(pose[k, 2] + angles[near]), np.sin(pose[k, 2] + angles[near])
@@ -140,7 +147,8 @@ def _velocities(
             dx, dy = others[j, 0] - pose[k, 0], others[j, 1] - pose[k, 1]
             d = np.hypot(dx, dy)
             if 1e-9 < d < influence + keep[k, 0]:
-                fx, fy = _push(dx / d, dy / d, d - keep[k, 0], gx, gy, away, influence, swirl, scaled)
+                turned = swirl if dx * gy - dy * gx > 0 else -swirl
+                fx, fy = _push(dx / d, dy / d, d - keep[k, 0], gx, gy, away, influence, turned, scaled)
                 vx, vy = vx + robots * fx, vy + robots * fy
         size = np.hypot(vx, vy)
         if size > speed[k]:
@@ -156,7 +164,7 @@ def _push(
     """Return the push of a thing at distance `d` along the unit vector u, the goal `away` along the unit vector g.
 
     Plain: the gradient of (1/d - 1/influence)^2 / 2. Scaled: of the same times min(away, 1)^2, whose second term draws to
-    the goal; the push is turned by `swirl` to run along the thing on the side of the goal where the thing is in the way.
+    the goal; where the thing is in the way, a part `swirl` of the push runs along it, to port if positive.
     """
     d = max(d, NEAREST)
     gap = 1 / d - 1 / influence
@@ -173,8 +181,7 @@ def _push(
         fx, fy = fx + drawn * gx, fy + drawn * gy
     facing = ux * gx + uy * gy
     if facing > 0:
-        side = 1.0 if ux * gy - uy * gx >= 0 else -1.0  # the goal is to port of the thing, or straight behind it
-        fx, fy = fx - swirl * facing * force * side * uy, fy + swirl * facing * force * side * ux
+        fx, fy = fx - swirl * facing * force * uy, fy + swirl * facing * force * ux
     return fx, fy
 
 

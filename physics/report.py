@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
@@ -30,6 +30,7 @@ LIMITS: dict[str, tuple[float | None, str]] = {
     "battery": (1.0, "energy used over the battery's"),
     "endurance": (1.0, "time under way over the endurance"),
     "delay": (1.5, "time driven over time planned"),
+    "localisation": (None, "95 % of a vehicle's localisation errors, m (default: not judged)"),
 }
 
 
@@ -41,6 +42,21 @@ class CrossTrack:
     p95: float
     max: float
     samples: int
+
+
+@dataclass(frozen=True, slots=True)
+class Localisation:
+    """How far a vehicle's belief was from the truth, metres; the parts of the time that it lived by `lidar`, `gnss` and
+    `dead` reckoning (the rest it simply knew); how many `recoveries` its particle filter tried.
+    """
+
+    mean: float
+    p95: float
+    max: float
+    lidar: float
+    gnss: float
+    dead: float
+    recoveries: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +87,8 @@ class VehicleReport:
     energy: float
     length_planned: float
     length: float
+    lost: bool = False
+    localisation: Localisation | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,10 +148,13 @@ def measure(
     served: Mapping[str, float],
     limits: Mapping[str, float],
     settings: Mapping[str, Any],
+    lost: Sequence[bool] | None = None,
+    localisation: Sequence[Mapping[str, Any]] | None = None,
 ) -> Report:
     """Measure a trace against the mission and judge it.
 
-    `finished` and `aground` are (k,), `served` the times at which tasks were. Raises InputError for an unknown limit.
+    `finished` and `aground` are (k,), `served` the times at which tasks were, `lost` (k,) the vehicles lost by a
+    fault (default: none), `localisation` what `Senses.report` returns. Raises InputError for an unknown limit.
     """
     allowed = check_limits(limits)
     size = np.array([np.hypot(v.model.length, v.model.width) for v in mission.vehicles])
@@ -144,6 +165,9 @@ def measure(
         _vehicle(mission, trace, i, bool(finished[i]), bool(aground[i]), routes, near, thin)
         for i in range(len(trace.vehicles))
     )
+    gone = lost or [False] * len(vehicles)
+    places = [None if localisation is None else Localisation(**localisation[i]) for i in range(len(vehicles))]
+    vehicles = tuple(replace(v, lost=g, localisation=p) for v, g, p in zip(vehicles, gone, places, strict=True))
     figures = _figures(mission, trace, vehicles, served)
     reasons = _reasons(mission, vehicles, figures, allowed)
     return Report(mission.name, VERSION, settings, allowed, figures, vehicles, tuple(reasons), trace.hash)
@@ -238,6 +262,8 @@ def _figures(
         "energy": sum(v.energy for v in vehicles),
         "length_planned": sum(v.length_planned for v in vehicles),
         "length": sum(v.length for v in vehicles),
+        "lost": sum(v.lost for v in vehicles),
+        "localisation_p95": max((v.localisation.p95 for v in vehicles if v.localisation), default=None),
     }
 
 
@@ -279,6 +305,9 @@ def _reasons(
             )
         if v.separation is not None and v.separation < (allowed["separation"] or 0.0):
             reasons.append(f"{v.id}: {v.separation:.2f} m from {v.separation_vehicle} at {v.separation_time:.0f} s")
+        if v.localisation is not None:
+            off = v.localisation.p95
+            over("localisation", off, f"{v.id}: 95 % of localisation errors up to {off:.2f} m")
         over(
             "battery",
             v.energy / vehicle.battery,

@@ -9,58 +9,74 @@ import numpy as np
 from numba import njit
 
 HORIZON = 20.0  # s
-EVASION = 0.6  # radians to starboard
 
 
 @njit(cache=True)
 def give_way(
-    position: np.ndarray, velocity: np.ndarray, size: np.ndarray, present: np.ndarray, slow: np.ndarray, bias: np.ndarray
+    position: np.ndarray,
+    course: np.ndarray,
+    speed: np.ndarray,
+    pace: np.ndarray,
+    aside: np.ndarray,
+    keep: np.ndarray,
+    present: np.ndarray,
+    slow: np.ndarray,
+    want: np.ndarray,
 ) -> None:
-    """Set `slow` (k,), the speed allowed in m/s, and `bias` (k,), radians added to the course, counter-clockwise.
+    """Set `slow` (k,), the speed allowed, m/s, and `want` (k,), how far to starboard of its path each is to go, metres.
 
-    `position` and `velocity` (k, 3); `size` (k,) the distance kept, metres, of each; `present` (k,) those that are out
-    there.
+    `position` (k, 3); `course` (k, 2) the direction of the leg, zeros for one that lies still; `speed` (k,) over ground and
+    `pace` (k,) as planned, m/s; `aside` (k,) how far off its leg each has already gone; `keep` (k,) the distance kept;
+    `present` (k,) those out there. Conflicts are looked for between the legs as planned, so that a vehicle stays aside
+    until the other is past.
     """
     for i in range(len(position)):
-        slow[i], bias[i] = np.inf, 0.0
+        slow[i], want[i] = np.inf, 0.0
         if not present[i]:
             continue
-        vi = np.hypot(velocity[i, 0], velocity[i, 1])
-        course = np.arctan2(velocity[i, 1], velocity[i, 0])
+        going = course[i, 0] != 0.0 or course[i, 1] != 0.0
+        angle = np.arctan2(course[i, 1], course[i, 0])
+        ux, uy = pace[i] * course[i, 0], pace[i] * course[i, 1]
         for j in range(len(position)):
             if j == i or not present[j]:
                 continue
-            keep = max(size[i], size[j])
+            apart = 0.5 * (keep[i] + keep[j])
             px, py = position[j, 0] - position[i, 0], position[j, 1] - position[i, 1]
-            vj = np.hypot(velocity[j, 0], velocity[j, 1])
-            away = np.hypot(px, py)
-            if away > keep + (vi + vj) * HORIZON or abs(position[j, 2] - position[i, 2]) > keep:
+            if np.hypot(px, py) > 2 * apart + (speed[i] + speed[j]) * HORIZON:
                 continue
-            if away < keep and vi < 0.1 and i > j:  # wait until the one before has gone
-                slow[i] = 0.0
+            if abs(position[j, 2] - position[i, 2]) > apart:
                 continue
-            if vi < 0.1:
+            if speed[i] < 0.1:  # about to start: those before it in the list go first
+                if np.hypot(px, py) < apart and i > j:
+                    slow[i] = 0.0
                 continue
-            wx, wy = velocity[j, 0] - velocity[i, 0], velocity[j, 1] - velocity[i, 1]
+            if not going:
+                continue
+            # Both as they would be on their legs.
+            px += aside[i] * course[i, 1] - aside[j] * course[j, 1]
+            py += aside[j] * course[j, 0] - aside[i] * course[i, 0]
+            vx, vy = speed[j] * course[j, 0], speed[j] * course[j, 1]
+            wx, wy = vx - ux, vy - uy
             square = wx * wx + wy * wy
             soon = min(max(-(px * wx + py * wy) / square, 0.0), HORIZON) if square > 1e-9 else 0.0
-            if np.hypot(px + wx * soon, py + wy * soon) > keep:
+            if np.hypot(px + wx * soon, py + wy * soon) > apart:
                 continue
-            bearing = _wrap(np.arctan2(py, px) - course)
-            if abs(bearing) > 1.96:  # abaft the beam: it is the other's business
+            bearing = _wrap(np.arctan2(py, px) - angle)
+            if abs(bearing) > 1.96 and np.hypot(px, py) > 0.5 * apart:  # abaft the beam: the other's business
                 continue
-            if vj < 0.1:  # lies still: go round it
-                if away < 3 * keep + vi * 5.0:
-                    bias[i], slow[i] = -EVASION, min(slow[i], max(0.5 * vi, 0.3))
+            if vx == 0.0 and vy == 0.0 and speed[j] < 0.3:  # lies still: pass it by
+                want[i] = 1.3 * apart
                 continue
-            meeting = abs(_wrap(np.arctan2(velocity[j, 1], velocity[j, 0]) - course))
-            if meeting < 1.17:  # overtaking, or side by side
-                if abs(bearing) < 1.17 or i > j:
-                    slow[i] = min(slow[i], 0.8 * vj)
-            elif meeting > 2.62 and abs(bearing) < 0.5:  # head-on
-                bias[i] = -EVASION
-            elif bearing < 0.0:  # crossing, the other to starboard
-                bias[i], slow[i] = -EVASION, min(slow[i], 0.5 * vi)
+            meeting = abs(_wrap(np.arctan2(vy, vx) - angle))
+            if meeting > 2.62 and abs(bearing) < 1.6:  # head-on: both to starboard
+                want[i] = apart
+            elif meeting < 1.17:  # overtaking, or side by side
+                if abs(bearing) < 1.17 and (abs(bearing) < 0.8 or i > j):
+                    slow[i] = min(slow[i], 0.8 * speed[j])
+            elif bearing < 0.0:  # crossing, the other to starboard: let it pass ahead
+                slow[i] = min(slow[i], 0.35 * pace[i])
+                if meeting > 2.0:
+                    want[i] = apart
 
 
 @njit(cache=True)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numba import njit
+from shapely import Polygon
 
 from quarterdeck.geo.scenario import Site, Vehicle
 from quarterdeck.physics.trace import Trace
@@ -58,13 +59,10 @@ def sweep(site: Site, vehicle: Vehicle, trace: Trace, column: int) -> Swept:
     for piece, obstacle in zip(pieces[gap <= limit], nearest[gap <= limit], strict=True):
         first = firsts[piece]
         part = slice(first, first + PIECE + 1)
-        fine, turned, floor, parts = _refine(xy[part], heading[part], z[part], vehicle.model.length)
-        away = shapely.distance(_hulls(fine, turned, vehicle.model.length, vehicle.model.width), polygons[obstacle])
-        away[floor > height[obstacle]] = np.inf
-        k = int(np.argmin(away))
-        if away[k] < best[0]:
-            best = (float(away[k]), float(time[part][min(k // parts + 1, len(time[part]) - 1)]), obstacles[obstacle].id)
-        if away[k] == 0.0:
+        away, k = _distance(xy[part], heading[part], z[part], vehicle, polygons[obstacle], height[obstacle])
+        if away < best[0]:
+            best = (away, float(time[part][min(k + 1, len(time[part]) - 1)]), obstacles[obstacle].id)
+        if away == 0.0:
             hits.add(int(obstacle))
     return Swept(*best, tuple(obstacles[i].id for i in sorted(hits)))
 
@@ -80,21 +78,26 @@ def _nearest(
     return pairs[:, 0], pairs[:, 1], shapely.distance(lines[pairs[:, 0]], polygons[pairs[:, 1]])
 
 
-def _refine(
-    xy: np.ndarray, heading: np.ndarray, z: np.ndarray, length: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Return poses so close together that turning adds no more than EXACT to the hulls: places, headings, the least height
-    of each interval, and how many of them there are to one between samples.
+def _distance(
+    xy: np.ndarray, heading: np.ndarray, z: np.ndarray, vehicle: Vehicle, polygon: Polygon, height: float
+) -> tuple[float, int]:
+    """Return the least distance of the swept hull to a polygon of a height, and the interval of it.
 
-    The convex hull of a hull and itself turned by d reaches length * d / 4 too far amidships.
+    The convex hull of a hull and of itself turned by d reaches length * d / 4 too far amidships: where that could matter,
+    the interval is cut up until it reaches no further than EXACT.
     """
-    if len(xy) == 1:
-        return xy, heading, z, 1
+    length, width = vehicle.model.length, vehicle.model.width
+    away = shapely.distance(_hulls(xy, heading, length, width), polygon)
+    away[(np.minimum(z[:-1], z[1:]) if len(z) > 1 else z) > height] = np.inf
     turned = np.unwrap(heading)
-    parts = min(int(np.ceil(np.abs(np.diff(turned)).max() * length / 4 / EXACT)) or 1, 100)
-    at = np.linspace(0, len(xy) - 1, parts * (len(xy) - 1) + 1)
-    x, y, turned, z = (np.interp(at, np.arange(len(xy)), column) for column in (xy[:, 0], xy[:, 1], turned, z))
-    return np.column_stack([x, y]), turned, np.minimum(z[:-1], z[1:]), parts
+    slack = length / 4 * np.abs(np.diff(turned)) if len(xy) > 1 else np.zeros(1)
+    for k in np.flatnonzero((away <= (away + slack).min()) & (slack > EXACT)):
+        at = np.linspace(0, 1, min(int(np.ceil(slack[k] / EXACT)), 100) + 1)
+        places = xy[k] + at[:, None] * (xy[k + 1] - xy[k])
+        hulls = _hulls(places, turned[k] + at * (turned[k + 1] - turned[k]), length, width)
+        away[k] = shapely.distance(hulls, polygon).min()
+    nearest = int(np.argmin(away))
+    return float(away[nearest]), nearest
 
 
 def _hulls(xy: np.ndarray, heading: np.ndarray, length: float, width: float) -> np.ndarray:

@@ -57,6 +57,19 @@ class Limit(click.ParamType):
 @click.option(
     "--gusts", type=click.FloatRange(min=0), default=0.0, show_default=True, help="Standard deviation of gusts, m/s."
 )
+@click.option(
+    "--fail",
+    "faults",
+    metavar="FAULT",
+    multiple=True,
+    help="What goes wrong: usv-2@600 (lost), gnss:usv-1@300-420, thruster:usv-3@100, comms:usv-1@50, random:3; repeatable.",
+)
+@click.option(
+    "--gnss", type=click.Choice(["rtk", "sbas", "single"]), help="Receivers with errors, instead of perfect ones."
+)
+@click.option("--lidar", is_flag=True, help="Ground robots see by lidar, and steer clear of what is in their way.")
+@click.option("--amcl", is_flag=True, help="Ground robots localise by their lidar on the site's map (implies --lidar).")
+@click.option("--unmapped", metavar="SITE", help="GeoJSON with obstacles that are there, but that the plan does not know.")
 @seed_option
 @click.option(
     "--limit", "limits", type=Limit(), multiple=True, help="A limit of the verdict; repeatable. See docs/simulation.md."
@@ -72,6 +85,11 @@ def command(
     current: tuple[float, float],
     wind: tuple[float, float],
     gusts: float,
+    faults: tuple[str, ...],
+    gnss: str | None,
+    lidar: bool,
+    amcl: bool,
+    unmapped: str | None,
     seed: int,
     limits: tuple[tuple[str, float], ...],
     step: float,
@@ -83,13 +101,17 @@ def command(
     Exit status 1 if the verdict fails.
     """
     from quarterdeck.geo.errors import InputError
+    from quarterdeck.geo.reader import read_obstacles
     from quarterdeck.mission.planfile import read_plan
+    from quarterdeck.physics.sensing import Sensing
     from quarterdeck.physics.simulate import simulate
 
     for name in (report,):  # told before the run, not after it
         if name and name != "-" and Path(name).exists() and not force:
             raise InputError(f"{name} exists; give --force to overwrite it, or another name")
     mission = read_plan(plan)
+    strange = read_obstacles(unmapped, mission.frame) if unmapped else ()
+    sensing = Sensing(gnss=gnss, lidar=lidar, amcl=amcl, unmapped=strange)
     with _progress(mission.name) as progress:
         run = simulate(
             mission,
@@ -98,6 +120,8 @@ def command(
             current=current,
             wind=wind,
             gusts=gusts,
+            faults=faults,
+            sensing=sensing,
             limits=dict(limits),
             progress=progress,
         )
@@ -160,6 +184,10 @@ def print_report(mission: Mission, report: Report) -> None:
         words.append(f"tasks {figures['tasks_served']} of {figures['tasks_planned']} served")
     words.append(f"collisions {figures['collisions']}")
     words.append(f"finished {figures['finished']} of {len(report.vehicles)}")
+    if figures["lost"]:
+        words.append(f"lost {figures['lost']}")
+    if figures["localisation_p95"] is not None:
+        words.append(f"localised to {figures['localisation_p95']:.2f} m (95 %, worst vehicle)")
     screen.print("; ".join(words))
     for reason in report.reasons:
         screen.print(f"[bold]failed:[/] {reason}", soft_wrap=True)

@@ -65,3 +65,27 @@ def lawnmower(
 def mow() -> Callable[..., Mission]:
     """Return the maker of missions."""
     return lawnmower
+
+
+def straight(model: str, *paths: Sequence[tuple[float, float]], speeds: Sequence[float] = ()) -> Mission:
+    """A vehicle for each path of (x, y) places, all transit, aerial ones already at their altitude."""
+    kind = load_model(model)
+    area = MultiPolygon([box(-1000.0, -1000.0, 1000.0, 1000.0)])
+    vehicles, routes = [], []
+    for i, path in enumerate(paths):
+        speed = speeds[i] if speeds else kind.speed
+        vehicle = Vehicle(
+            f"v{i + 1}", kind, path[0], end=path[-1], speed=speed, turn_radius=kind.turn_radius, clearance=kind.clearance
+        )
+        places = [Waypoint(*path[0], kind.altitude, "start")]
+        places += [Waypoint(*place, kind.altitude, "transit", speed=speed) for place in path[1:]]
+        vehicles.append(vehicle)
+        routes.append(Route(vehicle.id, tuple(places)))
+    site = Site((Area("area", area),), area)
+    return Mission("by hand", Frame(0.0, 0.0), site, tuple(vehicles), tuple(routes), "by hand")
+
+
+@pytest.fixture
+def sail() -> Callable[..., Mission]:
+    """Return the maker of straight missions."""
+    return straight

@@ -1,0 +1,176 @@
+"""Where the vehicles of a run believe themselves to be, and by what they know it."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+
+from quarterdeck.geo.scenario import Vehicle
+from quarterdeck.physics.amcl import (
+    ALARM,
+    FilterParams,
+    believe_at,
+    estimate,
+    lostness,
+    move,
+    recover,
+    resample,
+    weakest,
+    weigh_fix,
+    weigh_scan,
+    wrap,
+)
+from quarterdeck.physics.lidar import EdgeGrid
+from quarterdeck.physics.likelihood import DistanceField
+from quarterdeck.physics.positioning import (
+    COMPASS,
+    GNSS,
+    ODOMETRY,
+    GnssModel,
+    add_motion,
+    body_motion,
+    correct,
+    draw_faults,
+    fixes,
+    measure_motion,
+    predict,
+    step_slow,
+)
+
+KNOWN, LIDAR, BY_GNSS, DEAD = range(4)
+MODES = ("known", "lidar", "gnss", "dead reckoning")
+PERIOD = 0.5  # s between updates of the particle filters
+BRIDGE = 5.0  # s that odometry bridges before GNSS takes over where the lidar sees too little
+LAUNCHED = (0.1, 0.1, 0.05)  # m, m, radians: how well a robot knows where it was put down
+
+
+@dataclass(frozen=True, slots=True)
+class Map:
+    """What robots with lidar know of the site: its edges and its likelihood field."""
+
+    grid: EdgeGrid
+    field: DistanceField
+
+
+class Navigation:
+    """The whole fleet's. `believed` (k, 3) x, y, heading; `mode` (k,) the place in MODES of what it rests on.
+
+    A vehicle that has neither lidar nor GNSS modelled knows where it is, until its GNSS fails: then it reckons on from
+    there.
+    """
+
+    def __init__(
+        self,
+        vehicles: Sequence[Vehicle],
+        pose: np.ndarray,
+        random: np.random.Generator,
+        *,
+        gnss: GnssModel | None = None,
+        map: Map | None = None,  # noqa: A002 - the map of the robots
+        params: FilterParams | None = None,
+    ) -> None:
+        count = len(vehicles)
+        self.random, self.gnss, self.map, self.params = random, gnss, map, params or FilterParams()
+        self.receiver = gnss or GNSS["single"]
+        self.truth, self.believed = pose.copy(), pose.copy()
+        self.covariance = np.zeros((count, 3, 3))
+        self.slow = self.receiver.slow * random.standard_normal((count, 2))
+        self.mode = np.full(count, KNOWN)
+        domains = [v.domain for v in vehicles]
+        order = sorted(range(count), key=domains.__getitem__)
+        self.groups = [(ODOMETRY[d], np.array(list(i))) for d, i in groupby(order, key=domains.__getitem__)]
+        self.wrong = np.zeros((count, 3))
+        for model, index in self.groups:
+            self.wrong[index] = draw_faults(len(index), model, random)
+        self.lidar = np.array([i for i in range(count) if map is not None and domains[i] == "ground"], dtype=int)
+        self.beliefs = [believe_at(pose[i], LAUNCHED, self.params, random) for i in self.lidar]
+        self.pending = np.zeros((len(self.lidar), 3))  # pose change since the last update, in the frame of the pose then
+        self.weak = np.zeros(len(self.lidar))  # seconds for which the lidar has seen too little
+        self.recoveries = np.zeros(count, int)
+        self.mode[self.lidar] = LIDAR
+        self.by_fixes = np.setdiff1d(np.arange(count), self.lidar)
+        if gnss is not None:
+            self.mode[self.by_fixes] = BY_GNSS
+            self.covariance[self.by_fixes] = np.diag([gnss.slow**2, gnss.slow**2, COMPASS**2])
+            self.believed[self.by_fixes, :2] += self.slow[self.by_fixes]
+
+    def step(
+        self, time: float, step: float, pose: np.ndarray, deaf: np.ndarray, angles: np.ndarray, ranges: np.ndarray | None
+    ) -> None:
+        """Follow the vehicles to `pose` (k, 3), `step` seconds on. `deaf` (k,): no GNSS; `ranges` (lidars, b) of each
+        lidar.
+        """
+        told = np.empty_like(pose)
+        motion = body_motion(self.truth, pose)
+        for model, index in self.groups:
+            told[index] = measure_motion(motion[index], step, model, self.wrong[index], self.random)
+        self.truth = pose.copy()
+        self.slow = step_slow(self.slow, step, self.receiver, self.random)
+        fix = round(time / step) % max(round(self.receiver.interval / step), 1) == 0
+        self._reckon(step, told, deaf, fix)
+        if len(self.lidar):
+            self.believed[self.lidar] = add_motion(self.believed[self.lidar], told[self.lidar])
+            self.pending = add_motion(self.pending, told[self.lidar])
+            if ranges is not None and round(time / step) % round(PERIOD / step) == 0:
+                self._localise(deaf, fix, angles, ranges)
+
+    @property
+    def error(self) -> np.ndarray:
+        """(k, 3) believed less true x, y and heading."""
+        off = self.believed - self.truth
+        off[:, 2] = wrap(off[:, 2])
+        return off
+
+    def _reckon(self, step: float, told: np.ndarray, deaf: np.ndarray, fix: bool) -> None:
+        """Carry on the Kalman filters of the vehicles that live by fixes."""
+        self.mode[self.by_fixes] = np.where(deaf, DEAD, KNOWN if self.gnss is None else BY_GNSS)[self.by_fixes]
+        known = self.mode == KNOWN
+        self.believed[known], self.covariance[known] = self.truth[known], 0.0
+        for model, members in self.groups:
+            index = members[(self.mode[members] == BY_GNSS) | (self.mode[members] == DEAD)]
+            index = np.intersect1d(index, self.by_fixes)
+            if not len(index):
+                continue
+            pose, covariance = predict(self.believed[index], self.covariance[index], told[index], step, model)
+            if fix:
+                truth, heard = self.truth[index], ~deaf[index]
+                compass = truth[:, 2:] + COMPASS * self.random.standard_normal((len(index), 1))
+                place = fixes(truth, self.slow[index], self.receiver, self.random)
+                measured = np.hstack([place, compass])
+                white = max(self.receiver.white, 0.01)
+                pose, covariance = correct(pose, covariance, measured, np.array([white, white, np.inf]), heard)
+                compassed = np.array([np.inf, np.inf, COMPASS])
+                pose, covariance = correct(pose, covariance, measured, compassed, np.ones(len(index), bool))
+            self.believed[index], self.covariance[index] = pose, covariance
+
+    def _localise(self, deaf: np.ndarray, fix: bool, angles: np.ndarray, ranges: np.ndarray) -> None:
+        """Update the particle filters."""
+        assert self.map is not None
+        p, field, grid = self.params, self.map.field, self.map.grid
+        places = fixes(self.truth[self.lidar], self.slow[self.lidar], self.receiver, self.random)
+        for n, i in enumerate(self.lidar):
+            way = math.hypot(*self.pending[n, :2])
+            if way < 0.05 and abs(self.pending[n, 2]) < 0.05 and self.weak[n] == 0:
+                continue  # standing still, the same scan would be believed again and again
+            belief = self.beliefs[n]
+            motion = body_motion(np.zeros((1, 3)), self.pending[n : n + 1])[0]
+            belief = move(belief, motion, PERIOD, p, self.random)
+            self.pending[n] = 0.0
+            if weakest(self.believed[i], field, angles, ranges[n], p) <= p.weak:
+                self.weak[n] = 0.0
+                belief = weigh_scan(belief, field, angles, ranges[n], p)
+                if (part := lostness(belief)) > ALARM:
+                    self.recoveries[i] += 1
+                    belief = recover(belief, part, field, grid, angles, ranges[n], REACH, p, self.random)
+            else:
+                self.weak[n] += PERIOD
+                if self.weak[n] > BRIDGE and fix and not deaf[i]:
+                    belief = weigh_fix(belief, places[n], math.hypot(self.receiver.white, self.receiver.slow))
+            self.mode[i] = LIDAR if self.weak[n] <= BRIDGE else DEAD if deaf[i] else BY_GNSS
+            self.beliefs[n] = resample(belief, p, self.random)
+            self.believed[i] = estimate(self.beliefs[n]).pose
+
+
+REACH = 30.0  # m: of the lidars

@@ -1,0 +1,328 @@
+"""A run under way: all vehicles together, step by step."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely import LineString, MultiPolygon
+
+from quarterdeck.geo.scenario import Site
+from quarterdeck.mission.director import Command, Director, Event, State
+from quarterdeck.mission.mission import Mission, Waypoint
+from quarterdeck.physics.faults import Fault, active, next_change
+from quarterdeck.physics.fleet import Squad, form_squads
+from quarterdeck.physics.sensing import Legs, Senses, Sensing
+from quarterdeck.physics.separation import give_way
+from quarterdeck.physics.trace import TraceBuilder
+from quarterdeck.physics.wind import MEMORY, step_gusts
+from quarterdeck.physics.world import INCONSISTENT, World
+
+DECIDE = 1.0  # s between calls of the director
+HARBOUR = 4.0  # lengths: so near its start or end a vehicle is being launched or recovered
+KEEP = 3.0  # lengths kept from other vehicles
+CRASH = 4.0  # m/s: a multirotor that meets the ground faster is out of the mission
+STUCK = 60.0  # s in contact without a pause: the vehicle is given up
+
+
+@dataclass
+class Running:
+    """A run under way: what changes from step to step, all vehicles together."""
+
+    mission: Mission
+    director: Director
+    world: World
+    seed: int
+    current: np.ndarray
+    wind: np.ndarray
+    gusts: float
+    faults: tuple[Fault, ...]
+    sensing: Sensing
+    known: Site
+    time: float = 0.0
+    memory: Any = None
+    served: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        vehicles = self.mission.vehicles
+        self.count = len(vehicles)
+        routes = {route.vehicle: route.waypoints for route in self.mission.routes}
+        self.position, self.heading = _starts(self.mission, routes)
+        self.squads = form_squads(vehicles, self.position, self.heading, self.seed)
+        self.home = np.array([v.home for v in vehicles], float).reshape(-1, 2)
+        self.start = self.position[:, :2].copy()
+        self.harbour = np.array([HARBOUR * v.model.length for v in vehicles])
+        self.keep = np.array([KEEP * v.model.length for v in vehicles])
+        self.random = np.random.default_rng(self.seed)
+        self.gust = np.zeros((self.count, MEMORY))
+        self.velocity = np.zeros((self.count, 3))
+        self.underway, self.moored, self.aground = (np.zeros(self.count, bool) for _ in range(3))
+        self.contact = np.zeros(self.count, bool)
+        self.stuck = np.zeros(self.count)
+        self.commands: dict[str, tuple[Waypoint, ...]] = {}
+        self.told = np.zeros(self.count, int)
+        self.done = False
+        self.slow = np.full(self.count, np.inf)
+        rooms = {v.domain: _prepared(self.mission.site.navigable(v.domain)) for v in vehicles}
+        self.room = [rooms[v.domain] for v in vehicles]
+        self.ids = [v.id for v in vehicles]
+        self.change, self.suffering = -1.0, active((), self.ids, 0.0)
+        self.aerial = np.array([v.domain == "aerial" for v in vehicles])
+        self.lost = np.zeros(self.count, bool)
+        self.events: list[Event] = []  # not yet told to the director
+        self.heard: dict[str, State] = {}
+        self.undelivered: dict[str, Command] = {}
+        self.stalled = np.zeros(self.count, bool)
+        self.senses: Senses | None = None
+        if self.sensing != Sensing() or any(f.kind == "gnss" for f in self.faults):
+            pose = np.column_stack([self.position[:, :2], self.heading])
+            self.senses = Senses(self.sensing, self.known, vehicles, pose, np.random.default_rng([self.seed, 0x5E]))
+        blocking = [o for o in self.mission.site.obstacles if o.blocks & {v.domain for v in vehicles}]
+        self.world.add_obstacles(blocking)
+        self.world.add_vehicles(vehicles, self.position, self.heading)
+
+    @property
+    def finished(self) -> np.ndarray:
+        """(k,) bool: has done all it was told and was neither given up nor lost."""
+        return self._gather("idle") & ~self.aground & ~self.lost
+
+    def advance(self) -> None:
+        """One step of the world."""
+        step = self.world.step
+        if self.time >= self.change:
+            self._befall()
+        wind = self._wind(step)
+        for squad in self.squads:
+            squad.guide(self.time, step)
+            squad.drive(step, self.current, wind[squad.index])
+        position, heading = self._poses()
+        velocity = (position - self.position) / step
+        rate = ((heading - self.heading + np.pi) % (2 * np.pi) - np.pi) / step
+        touched = self.world.advance(velocity, rate)
+        self.contact[:] = False
+        for i in touched:
+            body, psi, v, r = self.world.state(i)
+            self.contact[i] = True
+            if np.abs(body - position[i]).max() > INCONSISTENT or abs(np.sin(psi - heading[i])) > INCONSISTENT:
+                if self.mission.vehicles[i].domain != "aerial":
+                    body[2] = 0.0
+                self.world.place(i, body, psi)
+                squad, place = self._squad(i)
+                squad.adopt(place, body, psi, v, r, self.current)
+                position[i], heading[i], velocity[i] = body, psi, (body - self.position[i]) / step
+        falling = (self.velocity[:, 2] < -CRASH) | self.lost
+        self.aground |= self.aerial & falling & (position[:, 2] <= 0.0)
+        self.position, self.heading, self.velocity = position, heading, velocity
+        self.stuck = np.where(self.contact, self.stuck + step, 0.0)
+        if self.senses is not None:
+            self._sense(self.senses)
+
+    def decide(self) -> None:
+        """Call the director, see to mooring, launching and keeping clear; once a second."""
+        if self.time >= self.change:
+            self._befall()
+        reached = self._gather("reached")
+        self.events += self._serve(reached)
+        mute = dict(zip(self.ids, self.suffering["comms"].tolist(), strict=True))
+        # What a mute vehicle has to tell waits; that it is mute is known.
+        events = tuple(e for e in self.events if not mute[e.vehicle] or e.kind == "lost")
+        self.events = [e for e in self.events if e not in events]
+        commands, self.memory = self.director(self.time, self._states(reached, mute), events, self.memory)
+        self.undelivered |= commands
+        for i, id in enumerate(self.ids):  # noqa: A001
+            if id in self.undelivered and not mute[id]:
+                command = self.undelivered.pop(id)
+                if not self.aground[i] and not self.lost[i]:
+                    squad, place = self._squad(i)
+                    squad.command(place, command.waypoints)
+                    self.commands[id], self.told[i] = command.waypoints, 0
+        self._moor()
+        if self.senses is not None:
+            self.senses.note()
+        self.done = bool((self._gather("idle") & ~self.lost | self.aground | self.lost & ~self.aerial).all())
+
+    def record(self, builder: TraceBuilder) -> None:
+        """Add a sample to the trace."""
+        tracks = np.empty(self.count, self.squads[0].tracks.dtype)
+        kind = np.empty(self.count, np.int8)
+        for squad in self.squads:
+            tracks[squad.index] = squad.tracks
+            kind[squad.index] = squad.table["kind"][squad.tracks["leg"]]
+        builder.add(
+            self.time,
+            x=self.position[:, 0],
+            y=self.position[:, 1],
+            z=self.position[:, 2],
+            heading=self.heading,
+            speed=np.hypot(self.velocity[:, 0], self.velocity[:, 1]),
+            energy=self._gather("energy"),
+            cross=tracks["cross"] if self.senses is None else self._true_cross(tracks["cross"]),
+            leg=tracks["leg"] - tracks["first"],
+            kind=kind,
+            turning=tracks["turning"],
+            underway=self.underway,
+            contact=self.contact,
+        )
+
+    def _true_cross(self, believed: np.ndarray) -> np.ndarray:
+        """Return (k,) cross-track errors in metres of where the vehicles are, not of where they believe to be."""
+        out = np.zeros(self.count)
+        for squad in self.squads:
+            t = squad.tracks
+            a, b = squad.table[np.maximum(t["leg"] - 1, t["first"])], squad.table[t["leg"]]
+            start, end = (np.column_stack([w["x"], w["y"], w["z"]]) for w in (a, b))
+            span, off = end - start, self.position[squad.index] - start
+            product = np.cross(span, off) / np.maximum(np.linalg.norm(span, axis=1), 1e-9)[:, None]
+            aerial = squad.vehicles[0].domain == "aerial"
+            out[squad.index] = np.linalg.norm(product, axis=1) if aerial else product[:, 2]
+        return np.where(believed != 0, out, 0.0)
+
+    def _states(self, reached: np.ndarray, mute: Mapping[str, bool]) -> dict[str, State]:
+        """Return what is known of each vehicle: of a mute one what was last heard, and that it is not heard."""
+        idle, energy = self._gather("idle"), self._gather("energy")
+        alive = ~self.aground & ~self.lost
+        for i, id in enumerate(self.ids):  # noqa: A001
+            if mute[id] and id in self.heard:
+                self.heard[id] = replace(self.heard[id], alive=False)
+            else:
+                x, y, z = self.position[i].tolist()
+                psi, used = float(self.heading[i]), float(energy[i])
+                self.heard[id] = State(x, y, z, psi, bool(alive[i]), int(reached[i]), bool(idle[i]), used)
+        return dict(self.heard)
+
+    def _befall(self) -> None:
+        """Let faults begin and end."""
+        before, self.suffering = self.suffering, active(self.faults, self.ids, self.time)
+        self.change = next_change(self.faults, self.time)
+        for i, id in enumerate(self.ids):  # noqa: A001
+            squad, place = self._squad(i)
+            if self.suffering["lost"][i] and not self.lost[i]:
+                self.lost[i] = True
+                squad.command(place, ())
+                squad.scale[place] = 0.0
+                self.events.append(Event("lost", id))
+            elif self.suffering["thruster"][i] != before["thruster"][i] and not self.lost[i]:
+                squad.scale[place, 0] = 0.5 if self.suffering["thruster"][i] else 1.0
+            if self.suffering["comms"][i] != before["comms"][i] and not self.lost[i]:
+                self.events.append(Event("lost" if self.suffering["comms"][i] else "returned", id))
+
+    def _sense(self, senses: Senses) -> None:
+        """See and localise after a step; tell the guidance and, of robots that get no further, the director."""
+        pose = np.column_stack([self.position[:, :2], self.heading])
+        step = self.world.step
+        deaf, present = self.suffering["gnss"], ~self.moored & ~self.aground & ~self.lost
+        senses.step(self.time + step, step, pose, deaf, present, self._legs())
+        for squad in self.squads:
+            squad.error[:] = senses.error[squad.index]
+            squad.tracks["slow"] = np.minimum(self.slow, senses.slow)[squad.index]
+            squad.tracks["bias"] = senses.bias[squad.index]
+        for i in np.flatnonzero(senses.stalled & ~self.stalled):
+            x, y, _ = senses.navigation.believed[i].tolist()
+            self.events.append(Event("blocked", self.ids[i], data={"x": x, "y": y}))
+        self.stalled = senses.stalled.copy()
+
+    def _legs(self) -> Legs:
+        """Return the legs under way."""
+        start, end = np.zeros((self.count, 2)), np.zeros((self.count, 2))
+        speed, number, mode = np.zeros(self.count), np.zeros(self.count, int), np.zeros(self.count, np.int8)
+        for squad in self.squads:
+            t, index = squad.tracks, squad.index
+            a, b = squad.table[np.maximum(t["leg"] - 1, t["first"])], squad.table[t["leg"]]
+            start[index], end[index] = np.column_stack([a["x"], a["y"]]), np.column_stack([b["x"], b["y"]])
+            speed[index], number[index], mode[index] = b["speed"], t["leg"], t["mode"]
+        length = np.array([v.model.length for v in self.mission.vehicles])
+        aside = self._gather("aside")
+        return Legs(start, end, speed, self.slow, aside, np.hypot(*self.velocity[:, :2].T), length, number, mode)
+
+    def _moor(self) -> None:
+        near = np.minimum(np.hypot(*(self.position[:, :2] - self.start).T), np.hypot(*(self.position[:, :2] - self.home).T))
+        idle = self._gather("idle")
+        self.aground |= self.stuck > STUCK
+        self.moored = idle & (np.hypot(*(self.position[:, :2] - self.home).T) < self.harbour)
+        underway = ~self.moored & ~self.aground & (near > self.harbour)
+        for i in np.flatnonzero(underway != self.underway):
+            self.world.set_underway(int(i), bool(underway[i]))
+        self.underway = underway
+        self._keep_clear()
+        for squad in self.squads:
+            squad.active[:] = ~(self.moored | self.aground)[squad.index]
+
+    def _keep_clear(self) -> None:
+        """Have vehicles give way to one another; one that has no room to go aside stays on its path."""
+        slow, want, aside = np.empty(self.count), np.empty(self.count), self._gather("aside")
+        course = self._gather("course")
+        speed = np.hypot(self.velocity[:, 0], self.velocity[:, 1])
+        give_way(
+            self.position, course, speed, self._gather("pace"), aside, self.keep, ~self.moored & ~self.aground, slow, want
+        )
+        for i in np.flatnonzero(want > aside):
+            ahead = self.position[i, :2] + course[i] * speed[i] * 5.0
+            side = ahead + (want[i] - aside[i]) * np.array([course[i, 1], -course[i, 0]])
+            if not self.room[i].contains(LineString([self.position[i, :2], ahead, side])):
+                want[i] = aside[i]
+        self.slow = slow
+        for squad in self.squads:
+            squad.tracks["slow"], squad.tracks["want"] = slow[squad.index], want[squad.index]
+
+    def _serve(self, reached: np.ndarray) -> tuple[Event, ...]:
+        """Return an event for each task served since the last call."""
+        events = []
+        for i, vehicle in enumerate(self.mission.vehicles):
+            for waypoint in self.commands.get(vehicle.id, ())[self.told[i] : reached[i]]:
+                if waypoint.task is not None:
+                    self.served[waypoint.task] = self.time
+                    events.append(Event("served", vehicle.id, waypoint.task))
+            self.told[i] = reached[i]
+        return tuple(events)
+
+    def _wind(self, step: float) -> np.ndarray:
+        """(k, 3) wind at each vehicle."""
+        if self.gusts == 0:
+            return np.broadcast_to(self.wind, (self.count, 3))
+        airspeed = np.linalg.norm(self.velocity - self.wind, axis=1)
+        noise = self.random.standard_normal((self.count, 3))
+        gust = step_gusts(self.gust, noise, airspeed, self.position[:, 2], self.gusts, step)
+        return self.wind + gust
+
+    def _poses(self) -> tuple[np.ndarray, np.ndarray]:
+        position, heading = np.empty((self.count, 3)), np.empty(self.count)
+        for squad in self.squads:
+            position[squad.index], heading[squad.index] = squad.pose()
+        return position, heading
+
+    def _gather(self, name: str) -> np.ndarray:
+        """(k, ...) of a squad's property over the whole fleet."""
+        parts = [getattr(squad, name) for squad in self.squads]
+        out = np.empty((self.count, *parts[0].shape[1:]), parts[0].dtype)
+        for squad, part in zip(self.squads, parts, strict=True):
+            out[squad.index] = part
+        return out
+
+    def _squad(self, i: int) -> tuple[Squad, int]:
+        """Return the squad of fleet member `i`, and its place there."""
+        for squad in self.squads:
+            place = int(np.searchsorted(squad.index, i))
+            if place < len(squad.index) and squad.index[place] == i:
+                return squad, place
+        raise KeyError(i)
+
+
+def _prepared(geometry: MultiPolygon) -> MultiPolygon:
+    """Return the geometry, made fast to ask about."""
+    shapely.prepare(geometry)
+    return geometry
+
+
+def _starts(mission: Mission, routes: Mapping[str, tuple[Waypoint, ...]]) -> tuple[np.ndarray, np.ndarray]:
+    """Return where the vehicles stand (k, 3) and head (k,): at their routes' first waypoint, towards the second."""
+    position, heading = np.zeros((len(mission.vehicles), 3)), np.zeros(len(mission.vehicles))
+    for i, vehicle in enumerate(mission.vehicles):
+        waypoints = routes.get(vehicle.id, ())
+        position[i, :2] = vehicle.start
+        if waypoints:
+            position[i] = waypoints[0].x, waypoints[0].y, waypoints[0].z if vehicle.domain == "aerial" else 0.0
+        onward = next((w for w in waypoints if np.hypot(w.x - position[i, 0], w.y - position[i, 1]) > 0.01), None)
+        if onward is not None:
+            heading[i] = np.arctan2(onward.y - position[i, 1], onward.x - position[i, 0])
+    return position, heading

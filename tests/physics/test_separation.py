@@ -1,0 +1,54 @@
+"""Encounters: nobody touches anybody, and everybody arrives."""
+
+import pytest
+
+from quarterdeck.geo.models import load_model
+from quarterdeck.physics.simulate import simulate
+
+pytest.importorskip("pybullet", reason="PyBullet has wheels for Linux and CPython 3.11 only")
+REACH = {"otter": 100.0, "wam-v": 100.0, "husky": 30.0, "survey-quad": 150.0, "crazyflie": 20.0}
+
+ENCOUNTERS = {
+    "head-on": [((-1, 0), (1, 0)), ((1, 0), (-1, 0))],
+    "crossing": [((-1, 0), (1, 0)), ((0, -1), (0, 1))],
+    "oblique": [((-1, 0), (1, 0)), ((0.8, -0.6), (-0.8, 0.6))],
+    "one start": [((0, 0), (1, 0)), ((0, 0), (1, 0.05)), ((0, 0), (1, -0.05))],
+    "one home": [((-1, 0), (0, 0)), ((1, 0), (0, 0)), ((0, 1), (0, 0))],
+}
+
+
+@pytest.mark.parametrize("encounter", ENCOUNTERS)
+@pytest.mark.parametrize("model", REACH)
+def test_they_give_way(sail, model, encounter):
+    """Two or three vehicles whose routes meet at the same time: apart by at least a tenth of a length, all finished."""
+    paths = [[(x * REACH[model], y * REACH[model]) for x, y in path] for path in ENCOUNTERS[encounter]]
+    figures = simulate(sail(model, *paths)).report.figures
+    assert figures["collisions"] == 0
+    assert figures["finished"] == len(paths)
+    assert figures["separation"] > 0.1 * load_model(model).length
+
+
+@pytest.mark.parametrize("model", REACH)
+def test_the_faster_stays_behind_the_slower(sail, model):
+    """On one track, the one behind at cruise and the one ahead at 60 % of it."""
+    kind, reach = load_model(model), REACH[model]
+    paths = [[(-reach, 0), (reach, 0)], [(-reach + 6 * kind.length, 0), (reach, 0)]]
+    run = simulate(sail(model, *paths, speeds=[kind.speed, 0.6 * kind.speed]))
+    assert run.report.figures["collisions"] == 0
+    assert run.report.figures["separation"] > 0.5 * kind.length
+
+
+def test_head_on_both_turn_to_starboard(sail):
+    """Rule 14: each leaves the other to port."""
+    trace = simulate(sail("otter", [(-60, 0), (60, 0)], [(60, 0), (-60, 0)])).trace
+    passing = abs(trace.x[:, 0] - trace.x[:, 1]).argmin()
+    assert trace.y[passing, 0] < -1.0
+    assert trace.y[passing, 1] > 1.0
+
+
+def test_crossing_the_one_with_the_other_to_starboard_lets_it_pass(sail):
+    """Rule 15: the one that goes north has the other, going west, to starboard, and passes astern of it."""
+    trace = simulate(sail("otter", [(0, -60), (0, 60)], [(60, 0), (-60, 0)])).trace
+    north, west = (trace.y[:, 0] > 0).argmax(), (trace.x[:, 1] < 0).argmax()
+    assert west < north  # the west-going one is first at the crossing
+    assert abs(trace.y[:, 1]).max() < 0.5  # and keeps its course
