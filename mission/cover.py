@@ -62,7 +62,7 @@ def cover_grid(
     """Return the mission that covers the hypervertices of a placed grid; `parameters` are told in it beside the grid's."""
     vehicles, site, step = scenario.vehicles, scenario.site, grid.spacing
     parts_of_all = shares(vehicles)
-    roads = _roadmaps(scenario)
+    roads = roadmaps(scenario)
     regions, notes = _regions(grid, vehicles, parts_of_all, roads, seed)
     laid = iter(lay_tracks(trackable(scenario, step), grid, [t for region in regions for t in region.tours], edge=edge))
     tracks = [[next(laid) for _ in region.tours] for region in regions]
@@ -141,7 +141,7 @@ def trackable(scenario: Scenario, spacing: float) -> MultiPolygon:
     return space
 
 
-def _roadmaps(scenario: Scenario) -> list[Roadmap]:
+def roadmaps(scenario: Scenario) -> list[Roadmap]:
     """Return each vehicle's roadmap; vehicles of one domain and clearance share it."""
     made: dict[tuple[str, float], Roadmap] = {}
     for v in scenario.vehicles:

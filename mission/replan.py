@@ -1,19 +1,23 @@
 """When things change: the mission from now on, from what really happened."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import shapely
 
+from quarterdeck.coverage.metrics import track_length, uncovered
 from quarterdeck.geo.errors import InputError
-from quarterdeck.geo.grid import Grid, lay_grid
 from quarterdeck.geo.scenario import Area, Obstacle, Scenario, Site, Vehicle, as_multipolygon
-from quarterdeck.mission.cover import cover_grid, trackable
+from quarterdeck.mission.cover import cover, roadmaps, trackable
 from quarterdeck.mission.mission import Mission, Route, Waypoint
 from quarterdeck.mission.progress import Progress, energy_left
+from quarterdeck.mission.routes import line_routes, survey_tracks
+from quarterdeck.mission.sharing import remaining_parts, share_out
 from quarterdeck.mission.timing import shortfalls, timed_route
 
-VISITED = 0.25  # spacings: a path cell is visited when a survey track came so near to its centre
+VISITED = 0.25  # spacings: a survey line is done where a track came so near
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,32 +39,44 @@ class Changes:
 def replan(mission: Mission, progress: Progress, changes: Changes = Changes(), *, seed: int | None = None) -> Mission:
     """Return the mission from `progress.time` on. Its times count from then; its vehicles start where they are.
 
-    What is done stays done. Without changes each route is what is left of it. After a change the survivors cover what is
-    left on the same grid, in the shares that they had among themselves, with the energy that they have, and come home.
+    What is done stays done. Without changes each route is what is left of it. After a change the survivors drive their own
+    survey lines on, and share those of the lost and of new areas so that all are done at about the same time; they do it
+    with the energy that they have, and come home. What does not fit is told in the mission's reasons.
 
     Raises InputError if a change names what is not in the plan, or nobody is left.
     """
     _check(mission, changes)
     if not changes:
         return _rest(mission, progress)
-    if mission.method != "stc":
-        raise InputError(f"a plan made by {mission.method!r} cannot be replanned yet; plan the rest as a site of its own")
+    if mission.spacing is None:
+        raise InputError(f"a plan made by {mission.method!r} has no survey lines to share out; plan the rest as a site")
     vehicles = _survivors(mission, progress, changes)
-    site = _changed_site(mission.site, changes)
     scenario = Scenario(
         name=mission.name,
         frame=mission.frame,
-        site=site,
+        site=_changed_site(mission.site, changes),
         vehicles=vehicles,
         tasks=mission.tasks,
         casualties=mission.casualties,
         spacing=mission.spacing,
         input_hash=mission.input_hash,
     )
-    grid = _remaining(_same_lattice(mission, scenario), progress)
-    told = {"replanned_at": progress.time, "lost": sorted(changes.lost)}
-    after = cover_grid(scenario, grid, seed=mission.seed if seed is None else seed, parameters=told)
-    return replace(after, routes=tuple(_airborne(r, after.vehicle(r.vehicle), progress) for r in after.routes))
+    roads = roadmaps(scenario)
+    own, released = _left(mission, scenario, progress, changes, mission.seed if seed is None else seed)
+    lines = share_out(vehicles, own, released, crumb=mission.spacing)
+    routes, reasons = line_routes(vehicles, lines, roads)
+    routes = tuple(_airborne(r, v, progress) for v, r in zip(vehicles, routes, strict=True))
+    return replace(
+        mission,
+        site=scenario.site,
+        vehicles=vehicles,
+        routes=routes,
+        parameters=dict(mission.parameters) | {"replanned_at": progress.time, "lost": sorted(changes.lost)},
+        figures=_figures(scenario.site, mission.spacing, progress, vehicles, routes),
+        bounds={},
+        reasons=tuple(reasons),
+        layers=(),
+    )
 
 
 def _check(mission: Mission, changes: Changes) -> None:
@@ -133,23 +149,48 @@ def _changed_site(site: Site, changes: Changes) -> Site:
     return Site(tuple(areas), operating, tuple(obstacles))
 
 
-def _same_lattice(mission: Mission, scenario: Scenario) -> Grid:
-    """Lay the plan's lattice over what is to be tracked now."""
-    spacing, angle = float(mission.parameters["spacing"]), float(mission.parameters["angle"])
-    x, y = mission.parameters["origin"]
-    cos, sin = np.cos(angle), np.sin(angle)
-    return lay_grid(trackable(scenario, spacing), spacing, angle, (x * cos + y * sin, y * cos - x * sin))
+def _left(
+    mission: Mission, scenario: Scenario, progress: Progress, changes: Changes, seed: int
+) -> tuple[list[list[np.ndarray]], list[np.ndarray]]:
+    """Return the (n, 2) survey lines still to be driven: each survivor's own in order, and those that nobody has."""
+    spacing = float(mission.spacing or 0.0)
+    done = shapely.union_all(
+        [shapely.buffer(shapely.LineString(t), VISITED * spacing) for t in progress.tracks if len(t) > 1]
+    )
+    reach = None
+    if changes.obstacles or changes.withdrawn:
+        reach = trackable(scenario, spacing).buffer(1e-6 * spacing)
+    by_vehicle = {
+        r.vehicle: [line for run in _runs(r) for line in remaining_parts(run, done, reach)] for r in mission.routes
+    }
+    released = [line for vehicle in sorted(changes.lost) for line in by_vehicle[vehicle]]
+    if changes.areas:
+        fresh = replace(scenario, site=replace(scenario.site, areas=changes.areas))
+        fresh = replace(fresh, vehicles=tuple(replace(v, share=None) for v in scenario.vehicles))
+        angle, edge = mission.parameters.get("angle"), mission.parameters.get("edge", "cells")
+        added = cover(fresh, spacing=spacing, seed=seed, angle=angle, edge=edge)
+        released += [run for r in added.routes for run in _runs(r)]
+    return [by_vehicle.get(v.id, []) for v in scenario.vehicles], released
 
 
-def _remaining(grid: Grid, progress: Progress) -> Grid:
-    """Return the grid without the hypervertices whose four path cells survey tracks have visited."""
-    if not progress.tracks:
-        return grid
-    tree = shapely.STRtree([shapely.LineString(t) for t in progress.tracks if len(t) > 1])
-    cells = np.argwhere(grid.cells)
-    hits = tree.query(shapely.points(grid.centres(cells)), predicate="dwithin", distance=VISITED * grid.spacing)[0]
-    visited = np.zeros(grid.cells.shape, dtype=bool)
-    visited[tuple(cells[np.unique(hits)].T)] = True
-    rows, columns = grid.hypervertices.shape
-    done = visited.reshape(rows, 2, columns, 2).all(axis=(1, 3))
-    return replace(grid, hypervertices=grid.hypervertices & ~done)
+def _runs(route: Route) -> list[np.ndarray]:
+    """Return the (n, 2) lines of a route's unbroken runs of survey legs."""
+    xy, survey = route.xyz[:, :2], route.survey
+    starts = np.flatnonzero(survey & ~np.roll(survey, 1)) - 1
+    ends = np.flatnonzero(survey & ~np.roll(survey, -1))
+    return [xy[a : b + 1] for a, b in zip(starts, ends, strict=True)]
+
+
+def _figures(
+    site: Site, spacing: float | None, progress: Progress, vehicles: Sequence[Vehicle], routes: Sequence[Route]
+) -> dict[str, Any]:
+    """Return what the mission comes to from now on, and with what is done already."""
+    ahead = [t for v, r in zip(vehicles, routes, strict=True) for t in survey_tracks(v, r)]
+    area = site.coverable
+    missed = uncovered([*progress.tracks, *ahead], area, float(spacing or 0.0))
+    return {
+        "poc": 1.0 - missed.area / area.area,
+        "length": sum(track_length(t) for t in ahead),
+        "makespan": max(r.duration for r in routes),
+        "energy": sum(r.energy for r in routes),
+    }

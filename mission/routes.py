@@ -19,37 +19,17 @@ LAYER_STEP = 5.0  # m between the altitudes at which aerial vehicles transit
 def survey_routes(
     vehicles: Sequence[Vehicle], tracks: Sequence[Sequence[np.ndarray]], roads: Sequence[Roadmap]
 ) -> tuple[tuple[Route, ...], list[str]]:
-    """Return each vehicle's route: out, round its closed tracks, home; and why some cannot be done."""
-    routes, reasons = [], []
-    for i, (vehicle, own, road) in enumerate(zip(vehicles, tracks, roads, strict=True)):
-        points, legs, missing = _path(vehicle, own, road)
-        points, legs, stuck = with_turns(points, legs, vehicle.turn_radius, road.polygon)
-        reasons += missing + [
-            f"{vehicle.id}: no room to turn at {vehicle.turn_radius:g} m, {x:.0f} m east and {y:.0f} m north of the centre"
-            for x, y in stuck
-        ]
-        height = np.zeros(len(points))
-        if vehicle.domain == "aerial":
-            survey = np.array([leg == "survey" for leg in legs])
-            height = np.where(survey, vehicle.altitude, vehicle.altitude + (i + 1) * LAYER_STEP)
-        wait = _launch_delay(vehicles, i)
-        xyz = np.column_stack([points, height])
-        if vehicle.domain == "aerial":
-            xyz, legs = _with_takeoff(xyz, legs)
-        route = timed_route(vehicle, xyz, legs, holds=[wait, *[0.0] * (len(xyz) - 1)])
-        routes.append(route)
-        reasons += shortfalls(vehicle, route)
-    return tuple(routes), reasons
+    """Return each vehicle's route out, round its closed (n, 2) tracks, nearest first, and home; and why some fail."""
+    return line_routes(vehicles, [_in_order(v, own) for v, own in zip(vehicles, tracks, strict=True)], roads)
 
 
-def _path(vehicle: Vehicle, tracks: Sequence[np.ndarray], road: Roadmap) -> tuple[np.ndarray, list[Leg], list[str]]:
-    """Return (n, 2) metres along transits and closed tracks, nearest first, the kind of each leg, and what fails."""
+def _in_order(vehicle: Vehicle, tracks: Sequence[np.ndarray]) -> list[np.ndarray]:
     here, left, lines = Point(vehicle.start), list(tracks), []
     while left:
         nearest = min(range(len(left)), key=lambda i: here.distance(LineString(left[i])))
         lines.append(_entered(left.pop(nearest), here))
         here = Point(lines[-1][-1])
-    return linked(vehicle, lines, road)
+    return lines
 
 
 def _entered(track: np.ndarray, point: Point) -> np.ndarray:
@@ -60,7 +40,40 @@ def _entered(track: np.ndarray, point: Point) -> np.ndarray:
     return _straightened(np.concatenate([np.array(p.coords) for p in parts]))
 
 
-def linked(vehicle: Vehicle, lines: Sequence[np.ndarray], road: Roadmap) -> tuple[np.ndarray, list[Leg], list[str]]:
+def _straightened(line: np.ndarray) -> np.ndarray:
+    """Return an (n, 2) polyline without the points in the middle of its straight runs."""
+    pieces = straight_pieces(line)
+    return np.concatenate([pieces[:, 0], pieces[-1:, 1]])
+
+
+def line_routes(
+    vehicles: Sequence[Vehicle], lines: Sequence[Sequence[np.ndarray]], roads: Sequence[Roadmap]
+) -> tuple[tuple[Route, ...], list[str]]:
+    """Return each vehicle's route along its (n, 2) survey lines in their order, and home; and why some cannot be done."""
+    routes, reasons = [], []
+    for i, (vehicle, own, road) in enumerate(zip(vehicles, lines, roads, strict=True)):
+        points, legs, missing = _linked(vehicle, own, road)
+        points, legs, stuck = with_turns(points, legs, vehicle.turn_radius, road.polygon)
+        reasons += missing + [
+            f"{vehicle.id}: no room to turn at {vehicle.turn_radius:g} m, {x:.0f} m east and {y:.0f} m north of the centre"
+            for x, y in stuck
+        ]
+        height = np.zeros(len(points))
+        flies = vehicle.domain == "aerial" and len(points) > 1
+        if flies:
+            survey = np.array([leg == "survey" for leg in legs])
+            height = np.where(survey, vehicle.altitude, vehicle.altitude + (i + 1) * LAYER_STEP)
+        wait = _launch_delay(vehicles, i)
+        xyz = np.column_stack([points, height])
+        if flies:
+            xyz, legs = _with_takeoff(xyz, legs)
+        route = timed_route(vehicle, xyz, legs, holds=[wait, *[0.0] * (len(xyz) - 1)])
+        routes.append(route)
+        reasons += shortfalls(vehicle, route)
+    return tuple(routes), reasons
+
+
+def _linked(vehicle: Vehicle, lines: Sequence[np.ndarray], road: Roadmap) -> tuple[np.ndarray, list[Leg], list[str]]:
     """Return (n, 2) metres from the start along survey lines (m, 2) in order and home, the kind of each leg, what fails."""
     points, legs, missing = [np.array([vehicle.start])], ["start"], []  # type: list[np.ndarray], list[Leg], list[str]
     for line in lines:
@@ -78,12 +91,6 @@ def linked(vehicle: Vehicle, lines: Sequence[np.ndarray], road: Roadmap) -> tupl
         points.append(way[1:])
         legs.extend(["transit"] * (len(way) - 1))
     return np.concatenate(points), legs, missing
-
-
-def _straightened(line: np.ndarray) -> np.ndarray:
-    """Return an (n, 2) polyline without the points in the middle of its straight runs."""
-    pieces = straight_pieces(line)
-    return np.concatenate([pieces[:, 0], pieces[-1:, 1]])
 
 
 def survey_tracks(vehicle: Vehicle, route: Route) -> list[np.ndarray]:
