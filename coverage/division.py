@@ -15,10 +15,17 @@ from quarterdeck.coverage.balance import balance
 from quarterdeck.coverage.bound import cells_at_least, fair_targets, lower_bound
 from quarterdeck.coverage.bricks import straight_trees, tree_turns
 from quarterdeck.coverage.growth import grow
+from quarterdeck.coverage.recombine import recombine
 from quarterdeck.geo.errors import InputError
 
 STRETCH = 8
 """How much dearer a step across the lanes is than one along them when regions grow along rows or columns."""
+
+LOOKS = 1000
+"""How many cells the straightening of borders may look at for each cell of the area; 90 million take about a second."""
+
+LEAST_LOOKS, MOST_LOOKS = 2_500_000, 300_000_000
+"""But no fewer and no more in all."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,14 +52,19 @@ class Division:
 
 
 def divide(
-    free: np.ndarray, starts: np.ndarray, shares: np.ndarray | None = None, *, seed: int = 0, turn_cost: float = 1.0
+    free: np.ndarray,
+    starts: np.ndarray,
+    shares: np.ndarray | None = None,
+    *,
+    seed: int = 0,
+    turn_cost: float | np.ndarray = 1.0,
 ) -> Division:
     """Divide the free hypervertices (R, C) bool among vehicles at `starts` (k, 2), distinct free rows and columns.
 
     `shares` (k,) are positive and sum to 1 within 1e-9; None means equal. `turn_cost` is what a turn costs in moves between
-    path cells: of the divisions tried the one whose slowest vehicle is soonest done wins. Every region is 4-connected
-    and has its vehicle's start; sizes are within one cell of the share where the geometry allows. Cells that no start
-    reaches are nobody's. Deterministic for a seed.
+    path cells, one number or (k,): of the fairest divisions tried the one whose slowest vehicle is soonest done wins.
+    Every region is 4-connected and has its vehicle's start; sizes are within one cell of the share where the geometry
+    allows. Cells that no start reaches are nobody's. Deterministic for a seed.
     Raises InputError for starts that are not distinct free cells, and for shares that do not fit.
     """
     free = np.ascontiguousarray(free, dtype=np.bool_)
@@ -70,13 +82,18 @@ def divide(
     bound = lower_bound(reachable, starts, shares, loads)
     floor = cells_at_least(bound, shares)
 
-    best, best_time = grown[0], np.inf
-    for labels, (_, _, lane) in zip(grown, lanes, strict=True):
-        balanced = balance(labels, cells, targets, width, lane, seed)
-        time = _time(balanced.reshape(padded.shape)[1:-1, 1:-1], shares, turn_cost)
-        if time < best_time:
-            best, best_time = balanced, time
-    labels = np.ascontiguousarray(best.reshape(padded.shape)[1:-1, 1:-1])
+    tried = [balance(labels, cells, targets, width, lane, seed) for labels, (_, _, lane) in zip(grown, lanes, strict=True)]
+    worst = np.array([(np.bincount(labels[labels >= 0], minlength=k) / floor).max() for labels in tried])
+    good = [labels for labels, load in zip(tried, worst, strict=True) if load <= worst.min() + 1e-9]
+
+    def time(labels: np.ndarray) -> float:
+        return _time(labels.reshape(padded.shape)[1:-1, 1:-1], shares, turn_cost)
+
+    rng = np.random.default_rng(seed)
+    budget = min(max(LOOKS * int(reachable.sum()), LEAST_LOOKS), MOST_LOOKS)
+    straight = min((recombine(labels, cells, width, rng, budget // 8) for labels in good), key=time)
+    straight = min((straight, recombine(straight, cells, width, rng, budget // 2)), key=time)
+    labels = np.ascontiguousarray(straight.reshape(padded.shape)[1:-1, 1:-1])
     sizes = np.bincount(labels[labels >= 0], minlength=k)
     ratio = float((sizes / floor).max())
     return Division(labels, sizes, targets, floor, bound.proof, ratio, _reasons(free, reachable, shares, sizes, targets))
@@ -110,12 +127,12 @@ def _in_free(free: np.ndarray, cells: np.ndarray) -> np.ndarray:
     return inside
 
 
-def _time(labels: np.ndarray, shares: np.ndarray, turn_cost: float) -> float:
-    """Return the largest load in moves per unit of share, turns included; all turns together break ties."""
+def _time(labels: np.ndarray, shares: np.ndarray, turn_cost: float | np.ndarray) -> float:
+    """Return the largest time per unit of share, in moves, turns included, plus the mean: the others count too."""
     k = len(shares)
     turns = tree_turns(*straight_trees(labels, k), labels, k)
-    moves = 4 * np.bincount(labels[labels >= 0], minlength=k)
-    return float(((moves + turn_cost * turns) / shares).max() + 1e-3 * turn_cost * turns.sum())
+    time = (4 * np.bincount(labels[labels >= 0], minlength=k) + turn_cost * turns) / shares
+    return float(time.max() + time.mean() + 1e-6 * turns.sum())
 
 
 def _reasons(
