@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.files import write_file
+from quarterdeck.mission.check import trespasses, unsound
 from quarterdeck.mission.mission import Mission
 
 Autopilot = Literal["ardupilot", "px4"]
@@ -47,13 +48,17 @@ def export(
     """Write `mission` in each of the formats `to` (names of `FORMATS`) into the folder `out`; return the files' paths.
 
     `tell` is called with one line for each limit that the mission meets in a format. Raises InputError, and writes nothing,
-    for an unknown format or autopilot, for two formats that would write the same file, and where a file stands already
-    and not `force`.
+    for a plan that leaves the operating area or crosses a no-go zone, an unknown format or autopilot, two formats that
+    would write the same file, and where a file stands already and not `force`.
     """
     names = [to] if isinstance(to, str) else list(to)
     if autopilot not in AUTOPILOTS:
         raise InputError(f"unknown autopilot {autopilot!r}; known: {', '.join(AUTOPILOTS)}")
     settings = Settings(autopilot, tell or (lambda _line: None))
+    problems = unsound(mission) or trespasses(mission)
+    if problems:
+        more = f" (and {len(problems) - 1} more: `quarterdeck check` lists them)" if len(problems) > 1 else ""
+        raise InputError(f"the plan must not leave like this: {problems[0]}{more}; plan it again")
     made: dict[str, bytes | str] = {}
     for name in dict.fromkeys(names):
         module, options, _ = _format(name)

@@ -9,13 +9,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quarterdeck.exporters.export import Autopilot
+from quarterdeck.exporters.export import Autopilot, Settings
 from quarterdeck.geo.scenario import Vehicle
+from quarterdeck.mission.check import homeward
 from quarterdeck.mission.mission import Mission, Route, Waypoint
 
 WAYPOINT, RETURN, LAND, TAKEOFF, DELAY = 16, 20, 21, 22, 93
 CHANGE_SPEED, TRIGGER_DISTANCE = 178, 206
 GLOBAL, MISSION_FRAME, RELATIVE = 0, 2, 3
+
+CORNER = 2.0  # m: how far from a waypoint ArduPilot 4.6 turned, flown in its own simulator
 
 # Beyond these counts of items many boards refuse the upload: ArduPilot's 16 kB storage holds 724; PX4 on small boards 500.
 MOST_ITEMS = {"ardupilot": 724, "px4": 500}
@@ -78,6 +81,18 @@ def mission_items(mission: Mission, route: Route, autopilot: Autopilot) -> list[
             lon, lat = places[-1]
             items.append(Item(LAND, RELATIVE, (0.0, 0.0, 0.0, _yaw(headings[-1], autopilot)), lat, lon, 0.0))
     return items
+
+
+def tell_limits(mission: Mission, settings: Settings) -> None:
+    """Say, once an export, what autopilots do that a plan cannot hinder: return straight, and cut corners."""
+    for line in homeward(mission):
+        settings.tell(line)
+    for vehicle in mission.vehicles:
+        if vehicle.clearance < CORNER:
+            settings.tell(
+                f"{vehicle.id}: autopilots cut corners by about {CORNER:g} m and its clearance is {vehicle.clearance:g} m; "
+                f"lower the autopilot's waypoint radius to {acceptance_radius(vehicle):g} m"
+            )
 
 
 def _wait(route: Route) -> list[Item]:

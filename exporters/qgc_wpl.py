@@ -9,7 +9,7 @@ from shapely import Polygon
 
 from quarterdeck.exporters.export import Settings
 from quarterdeck.exporters.fence import fence_polygons
-from quarterdeck.exporters.mavlink import GLOBAL, MOST_ITEMS, WAYPOINT, Item, mission_items
+from quarterdeck.exporters.mavlink import GLOBAL, MOST_ITEMS, WAYPOINT, Item, mission_items, tell_limits
 from quarterdeck.geo.files import safe_names
 from quarterdeck.mission.mission import Mission
 
@@ -20,6 +20,7 @@ def files(mission: Mission, settings: Settings) -> dict[str, str]:
     """Return each vehicle's `<vehicle>.waypoints`, and its geofence and rally point as `.fence.txt` and `.rally.txt`."""
     stems = safe_names(v.id for v in mission.vehicles)
     made: dict[str, str] = {}
+    tell_limits(mission, settings)
     for route in mission.routes:
         stem = stems[route.vehicle]
         lon, lat = mission.frame.to_degrees(route.xyz[:1, :2])[0]

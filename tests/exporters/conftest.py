@@ -91,7 +91,7 @@ def inspection() -> Mission:
     tasks = tuple(Task(f"t{i}", (20.0 * i, 15.0), service_time=30.5) for i in range(1, 4))
     stops = [Waypoint(*t.position, 0.0, "transit", 1.0, t.service_time, task=t.id) for t in tasks]
     route = timed(vehicle, [Waypoint(0.0, 0.0, 0.0, "start"), *stops, Waypoint(0.0, 0.0, 0.0, "transit", 1.0)])
-    site = Site((), MultiPolygon([box(-10.0, -10.0, 80.0, 40.0)]), (Obstacle("shed", box(30.0, 0.0, 40.0, 8.0)),))
+    site = Site((), MultiPolygon([box(-10.0, -10.0, 80.0, 40.0)]), (Obstacle("shed", box(30.0, -8.0, 40.0, 0.0)),))
     return Mission("yard", Frame(8.5, 47.4), site, (vehicle,), (route,), "assign", tasks=tasks)
 
 

@@ -1,12 +1,16 @@
 """The one door: registry, names, refusal before anything is written."""
 
 import json
+import math
+from dataclasses import replace
 
 import pytest
+from shapely import box
 
 from quarterdeck.exporters.export import FORMATS, export
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.files import safe_names
+from quarterdeck.geo.scenario import Obstacle
 
 
 @pytest.mark.parametrize("make", ["boats", "quads", "ugv"])
@@ -75,3 +79,23 @@ def test_geojson_is_styled_and_split_at_the_antimeridian(make_fleet, tmp_path):
         for part in parts:
             longitudes = [position[0] for position in part]
             assert max(longitudes) - min(longitudes) < 1.0
+
+
+def test_a_plan_that_trespasses_is_refused(boats, tmp_path):
+    """A route through the island, over the fence or with a NaN stops the export; nothing is written."""
+    route = boats.routes[2]
+    cases = ((400.0, 300.0, "no-go zone 'island'"), (900.0, 250.0, "leaves the operating"), (0.0, math.nan, "y is nan"))
+    for x, y, why in cases:
+        waypoints = (*route.waypoints[:5], replace(route.waypoints[5], x=x, y=y), *route.waypoints[6:])
+        bad = replace(boats, routes=(*boats.routes[:2], replace(route, waypoints=waypoints), *boats.routes[3:]))
+        with pytest.raises(InputError, match=why):
+            export(bad, "qgc-wpl", tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_way_home_is_told(boats, tmp_path):
+    """A straight return that would cross a no-go zone is said when a mission file is written."""
+    rock = Obstacle("rock", box(100.0, 12.0, 110.0, 18.0))
+    said = []
+    export(replace(boats, site=replace(boats.site, obstacles=(rock,))), "qgc-wpl", tmp_path, tell=said.append)
+    assert any("usv1" in line and "straight way home" in line for line in said)
