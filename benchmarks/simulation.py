@@ -19,6 +19,7 @@ from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.models import DEFAULT_MODEL, load_model
 from quarterdeck.geo.scenario import Area, Obstacle, Site, Vehicle
 from quarterdeck.mission.mission import Mission, Route, Waypoint
+from quarterdeck.physics.sensing import Sensing
 from quarterdeck.physics.simulate import simulate
 
 REACH = {"surface": 5000.0, "ground": 1000.0, "aerial": 5000.0}  # m, length of a survey leg
@@ -49,14 +50,16 @@ def mission(count: int, domain: str, model: str) -> Mission:
     return Mission("benchmark", Frame(0, 0), site, tuple(vehicles), tuple(routes), "by hand", spacing=spacing)
 
 
-def measure(count: int, domain: str, model: str, seconds: float, step: float, gusts: float, runs: int) -> dict[str, Any]:
+def measure(
+    count: int, domain: str, model: str, seconds: float, step: float, gusts: float, runs: int, sensing: Sensing
+) -> dict[str, Any]:
     """Return the figures of the median of `runs` runs."""
     plan = mission(count, domain, model)
-    simulate(plan, duration=2.0, step=step, gusts=gusts)  # compile
+    simulate(plan, duration=2.0, step=step, gusts=gusts, sensing=sensing)  # compile
     spent = []
     for _ in range(runs):
         began = time.process_time()
-        run = simulate(plan, duration=seconds, step=step, gusts=gusts)
+        run = simulate(plan, duration=seconds, step=step, gusts=gusts, sensing=sensing)
         spent.append(time.process_time() - began)
     simulated, cpu = float(run.trace.time[-1]), float(np.median(spent))
     return {
@@ -64,12 +67,15 @@ def measure(count: int, domain: str, model: str, seconds: float, step: float, gu
         "vehicles": count,
         "simulated_seconds": simulated,
         "step": step,
+        "lidar": sensing.lidar,
+        "amcl": sensing.amcl,
         "obstacles": len(plan.site.obstacles),
         "cpu_seconds": round(cpu, 3),
         "times_real_time": round(simulated / cpu, 1),
         "vehicle_seconds_per_second": round(count * simulated / cpu),
         "peak_megabytes": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024),
         "collisions": run.report.figures["collisions"],
+        "localisation_p95": run.report.figures["localisation_p95"],
     }
 
 
@@ -83,14 +89,17 @@ def main() -> None:
     parser.add_argument("--step", type=float, default=0.1)
     parser.add_argument("--gusts", type=float, default=0.0)
     parser.add_argument("--runs", type=int, default=3, help="the median of so many")
+    parser.add_argument("--lidar", action="store_true", help="ground robots see: 180 beams at 10 Hz")
+    parser.add_argument("--amcl", action="store_true", help="and localise by it: particle filters at 2 Hz")
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--table", action="store_true", help="5, 50 and 1,000 vehicles of each domain instead")
     o = parser.parse_args()
     cases = [(o.vehicles, o.domain, o.seconds)]
     if o.table:
         cases = [(count, domain, 600.0 if count < 1000 else 60.0) for domain in REACH for count in (5, 50, 1000)]
+    sensing = Sensing(lidar=o.lidar or o.amcl, amcl=o.amcl)
     rows = [
-        measure(count, domain, o.model or DEFAULT_MODEL[domain], seconds, o.step, o.gusts, o.runs)
+        measure(count, domain, o.model or DEFAULT_MODEL[domain], seconds, o.step, o.gusts, o.runs, sensing)
         for count, domain, seconds in cases
     ]
     if o.json:

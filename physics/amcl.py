@@ -16,7 +16,7 @@ from quarterdeck.physics.likelihood import DistanceField, log_likelihoods, scan_
 from quarterdeck.physics.relocate import anywhere, relocate
 
 BIN = (0.5, math.radians(10.0))  # m and radians: the KLD bins
-ALARM = 0.1  # lostness above which a filter had better be helped
+ALARM = 0.25  # lostness above which a filter had better be helped
 CLUSTER = (1.0, 0.5)  # m and radians: so far around the best place particles belong to it
 
 
@@ -173,9 +173,13 @@ def recover(
     reach: float,
     params: FilterParams,
     random: np.random.Generator,
+    around: tuple[np.ndarray, float] | None = None,
 ) -> Belief:
-    """Return the belief with a `part` of its weight moved to places where the scan fits."""
-    poses, scores = relocate(field, grid, angles, ranges, reach, random)
+    """Return the belief with a `part` of its weight moved to places where the scan fits.
+
+    `around`, a place (2,) and a distance in metres, says where to look, as a GNSS receiver can; else everywhere.
+    """
+    poses, scores = relocate(field, grid, angles, ranges, reach, random, around=around)
     if not len(poses):
         return belief
     count = max(round(part * params.most), 50)

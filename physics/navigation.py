@@ -161,9 +161,13 @@ class Navigation:
             if weakest(self.believed[i], field, angles, ranges[n], p) <= p.weak:
                 self.weak[n] = 0.0
                 belief = weigh_scan(belief, field, angles, ranges[n], p)
-                if (part := lostness(belief)) > ALARM:
+                doubt = 6 * math.hypot(self.receiver.white, self.receiver.slow)
+                astray = not deaf[i] and math.hypot(*(self.believed[i, :2] - places[n])) > doubt
+                part = 0.9 if astray else lostness(belief)
+                if part > ALARM:
                     self.recoveries[i] += 1
-                    belief = recover(belief, part, field, grid, angles, ranges[n], REACH, p, self.random)
+                    around = None if deaf[i] else (places[n], doubt)
+                    belief = recover(belief, part, field, grid, angles, ranges[n], REACH, p, self.random, around)
             else:
                 self.weak[n] += PERIOD
                 if self.weak[n] > BRIDGE and fix and not deaf[i]:

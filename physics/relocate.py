@@ -22,17 +22,22 @@ def relocate(
     reach: float,
     random: np.random.Generator,
     *,
+    around: tuple[np.ndarray, float] | None = None,
     tries: int = 40_000,
     keep: int = 60,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return (n, 3) poses where a scan fits, and how well (n,): 1 is a beam's mean likelihood at best.
 
-    `tries` poses anywhere are compared with a few beams, the `keep` best are moved to where they fit better, and what they
-    would see is cast and compared with what is seen: beams through a wall are found out, which the field alone does not do.
+    `tries` poses anywhere, or `around` a place (2,) within a distance in metres, are compared with a few beams, the `keep`
+    best are moved to where they fit better, and what they would see is cast and compared with what is seen: beams through
+    a wall are found out, which the field alone does not do.
     """
     if np.count_nonzero(np.isfinite(ranges)) < 3:
         return np.empty((0, 3)), np.empty(0)
     poses = anywhere(field, tries, random)
+    if around is not None:
+        angle, away = random.uniform(0, 2 * np.pi, tries), around[1] * np.sqrt(random.random(tries))
+        poses[:, :2] = around[0] + away[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
     finite = np.flatnonzero(np.isfinite(ranges))
     few = finite[spread_beams(len(finite), 16)]
     told, _ = log_likelihoods(field.values, field.origin, field.spacing, poses, angles[few], ranges[few], 0.5, 0.1)
