@@ -15,14 +15,19 @@ def dubins_path(start: tuple[float, float, float], goal: tuple[float, float, flo
     return dubins_paths(start, goal, radius)[0]
 
 
-def dubins_paths(start: tuple[float, float, float], goal: tuple[float, float, float], radius: float) -> list[np.ndarray]:
-    """Return the paths of all words that exist, shortest first: where the shortest has no room, another may have."""
+def dubins_paths(
+    start: tuple[float, float, float], goal: tuple[float, float, float], radius: float, chord: float = CHORD
+) -> list[np.ndarray]:
+    """Return the paths of all words that exist, shortest first: where the shortest has no room, another may have.
+
+    Neighbouring points of an arc are `chord` radians apart.
+    """
     dx, dy = goal[0] - start[0], goal[1] - start[1]
     distance, theta = math.hypot(dx, dy) / radius, math.atan2(dy, dx)
     alpha, beta = (start[2] - theta) % math.tau, (goal[2] - theta) % math.tau
     found = [(sum(lengths), word, lengths) for word in WORDS if (lengths := _lengths(word, alpha, beta, distance))]
     found.sort(key=lambda f: (f[0], f[1]))
-    return [_sampled(start, word, lengths, radius, goal) for _, word, lengths in found]
+    return [_sampled(start, word, lengths, radius, goal, chord) for _, word, lengths in found]
 
 
 WORDS = ("LSL", "RSR", "LSR", "RSL", "RLR", "LRL")
@@ -34,16 +39,18 @@ def _lengths(word: str, alpha: float, beta: float, d: float) -> tuple[float, flo
     if word in ("LSL", "RSR"):
         side = 1 if word == "LSL" else -1
         square = 2 + d * d - 2 * cab + 2 * side * d * (sa - sb)
-        if square < 0:
+        if square < -1e-9:
             return None
+        if square < 1e-12:  # both arcs lie on one circle
+            return _turn(side * (beta - alpha)), 0.0, 0.0
         phi = math.atan2(side * (cb - ca), d + side * (sa - sb))
-        return (side * (phi - alpha)) % math.tau, math.sqrt(square), (side * (beta - phi)) % math.tau
+        return _turn(side * (phi - alpha)), math.sqrt(max(0.0, square)), _turn(side * (beta - phi))
     if word in ("LSR", "RSL"):
         side = 1 if word == "LSR" else -1
         square = d * d - 2 + 2 * cab + 2 * side * d * (sa + sb)
-        if square < 0:
+        if square < -1e-9:
             return None
-        p = math.sqrt(square)
+        p = math.sqrt(max(0.0, square))
         phi = math.atan2(-side * (ca + cb), d + side * (sa + sb)) - math.atan2(-2.0 * side, p)
         return (side * (phi - alpha)) % math.tau, p, (side * (phi - beta)) % math.tau
     side = 1 if word == "RLR" else -1
@@ -51,8 +58,14 @@ def _lengths(word: str, alpha: float, beta: float, d: float) -> tuple[float, flo
     if abs(cosine) > 1:
         return None
     p = (math.tau - math.acos(cosine)) % math.tau
-    t = (side * (alpha - math.atan2(side * (ca - cb), d - side * (sa - sb))) + p / 2) % math.tau
-    return t, p, (side * (alpha - beta) - t + p) % math.tau
+    t = _turn(side * (alpha - math.atan2(side * (ca - cb), d - side * (sa - sb))) + p / 2)
+    return t, p, _turn(side * (alpha - beta) - t + p)
+
+
+def _turn(angle: float) -> float:
+    """Return an angle in [0, 2 pi); a full turn but for rounding is none."""
+    angle %= math.tau
+    return 0.0 if math.tau - angle < 1e-9 else angle
 
 
 def _sampled(
@@ -61,6 +74,7 @@ def _sampled(
     lengths: tuple[float, float, float],
     radius: float,
     goal: tuple[float, float, float],
+    chord: float,
 ) -> np.ndarray:
     x, y, heading = start
     points = [(x, y)]
@@ -71,7 +85,7 @@ def _sampled(
             continue
         side = 1 if letter == "L" else -1
         cx, cy = x - side * radius * math.sin(heading), y + side * radius * math.cos(heading)
-        steps = max(1, math.ceil(length / CHORD))
+        steps = max(1, math.ceil(length / chord))
         for k in range(1, steps + 1):
             h = heading + side * length * k / steps
             points.append((cx + side * radius * math.sin(h), cy - side * radius * math.cos(h)))

@@ -10,6 +10,7 @@ from shapely import LineString, MultiPolygon
 from quarterdeck.geo.dubins import CHORD, dubins_paths
 from quarterdeck.mission.mission import Leg
 
+COARSE = math.radians(30.0)  # between the waypoints of a curve: 3.4 % of the radius off it, and autopilots hold few
 REVERSAL = math.radians(150.0)  # a sharper bend is driven past, and come back to on a curve
 
 
@@ -41,7 +42,7 @@ def with_turns(
             continue
         j = i + 1 if crowded[i] and not reversal[i] and i + 2 < len(points) and abs(bend[i + 1]) > 1e-6 else i
         start, goal = (*points[i], heading[i - 1]), (*points[j], heading[j])
-        curve = next((c for c in dubins_paths(start, goal, radius) if space.covers(LineString(c))), None)
+        curve = next((c for c in dubins_paths(start, goal, radius, COARSE) if space.covers(LineString(c))), None)
         out.append(points[i])
         kinds.append(legs[i])
         if curve is None:

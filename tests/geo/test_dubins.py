@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 
 from quarterdeck.geo.dubins import dubins_path, dubins_paths
 
-pose = st.tuples(st.floats(-20, 20), st.floats(-20, 20), st.floats(-math.pi, math.pi))
+pose = st.tuples(st.floats(-20, 20), st.floats(-20, 20), st.floats(-math.pi, math.pi)).map(
+    lambda p: tuple(round(v, 6) for v in p)
+)
 
 
 def length(points):
