@@ -14,6 +14,9 @@ from typing import Any
 import numpy as np
 import shapely
 
+from quarterdeck.coverage.guards.pieces import paper_guards
+from quarterdeck.coverage.guards.space import Space
+from quarterdeck.coverage.network import Network, network
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.models import load_model
 from quarterdeck.geo.scenario import Area, Scenario, Site, Vehicle, as_multipolygon
@@ -40,6 +43,14 @@ def scenario_on(polygon: shapely.MultiPolygon, robots: int, starts: str, seed: i
     fleet = tuple(Vehicle(f"r{i}", model, (x, y), range=reach) for i, (x, y) in enumerate(places.tolist()))
     site = Site((Area("area", polygon),), polygon)
     return Scenario("map", Frame(0.0, 0.0), site, fleet)
+
+
+def paper_network(path: Path, reach: float, robots: int = 1) -> Network:
+    """Return the network on the paper's guards of a map."""
+    polygon = read_map(path)
+    scenario = scenario_on(polygon, robots, "spread", 0)
+    guards = paper_guards(Space(polygon, polygon, polygon, scenario.frame), reach)
+    return network(polygon, guards, scenario.starts)
 
 
 def measure(path: Path, reach: float, robots: int, starts: str, seed: int) -> dict[str, Any]:

@@ -56,7 +56,7 @@ def multi_prims(reduced: Graph, guards: np.ndarray, starts: Sequence[int] | np.n
             ticks[robot, start] = robot
     visited = (ticks != NEVER).any(axis=0)
     grow(reduced, guard, parents, ticks, visited, last, np.arange(k), k)
-    return prune(Forest(parents, _chosen(ticks), ticks))
+    return prune(Forest(parents, in_order(ticks), ticks))
 
 
 def grow(
@@ -90,27 +90,28 @@ def grow(
     )
 
 
-def prune(forest: Forest, robots: Sequence[int] | np.ndarray | None = None) -> Forest:
-    """Let robots give up, from the most recently chosen on, guards that another visited sooner; all by the same ticks."""
+def prune(forest: Forest, robots: np.ndarray | None = None, seen: np.ndarray | None = None) -> Forest:
+    """Let robots give up, from the most recently chosen on, guards that another visited sooner, or that are `seen` (n,).
+
+    All go by the same ticks, so that no guard is lost. `robots` are indices, default all.
+    """
     owners, ticks = forest.owners, forest.ticks.copy()
     parents = forest.parents.copy()
     for robot in range(len(parents)) if robots is None else robots:
         chosen = forest.chosen[robot]
         kept = len(chosen)
-        while kept and owners[chosen[kept - 1]] != robot:
+        while kept and (owners[chosen[kept - 1]] != robot or (seen is not None and seen[chosen[kept - 1]])):
             kept -= 1
         ticks[robot, chosen[kept:]] = NEVER
         root = np.flatnonzero(forest.parents[robot] == ROOT)
         parents[robot] = _chains(forest.parents[robot], np.concatenate([root, chosen[:kept]]))
-    return Forest(parents, _chosen(ticks), ticks)
+    return Forest(parents, in_order(ticks), ticks)
 
 
-def _chosen(ticks: np.ndarray) -> tuple[np.ndarray, ...]:
-    rows = []
-    for row in ticks:
-        mine = np.flatnonzero(row != NEVER)
-        rows.append(mine[np.argsort(row[mine], kind="stable")])
-    return tuple(rows)
+def in_order(ticks: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return, per robot, the vertices that it has chosen in the order of their ticks (k, n)."""
+    rows = [np.flatnonzero(row != NEVER) for row in ticks]
+    return tuple(mine[np.argsort(row[mine], kind="stable")] for row, mine in zip(ticks, rows, strict=True))
 
 
 @njit(cache=True)
@@ -142,6 +143,11 @@ def _grow(
     tick: int,
 ) -> bool:
     n = len(guard)
+    for robot in turns:  # a start that another owned until it was lost is in the tree already
+        for v in range(n):
+            if guard[v] and not visited[v] and parents[robot, v] != -1:
+                visited[v], ticks[robot, v], last[robot] = True, tick, v
+                tick += 1
     left = 0
     for v in range(n):
         left += guard[v] and not visited[v]
