@@ -76,8 +76,13 @@ def guide_vessels(
             if away < ARRIVED and np.hypot(wx, wy) < 0.2:  # near enough in slack water: rest
                 heading[i], speed[i] = psi, 0.0
                 continue
+        if np.hypot(wx, wy) < 0.1:
+            heading[i], speed[i] = psi, 0.0
+            continue
         heading[i] = np.arctan2(wy, wx)
-        speed[i] = min(np.hypot(wx, wy), lim.max_speed)
+        # Far off its heading it slows down, to as little as half: the turn is the tighter.
+        ease = min(max(1.5 - 0.625 * abs(_wrap(heading[i] - psi)), 0.5), 1.0)
+        speed[i] = min(np.hypot(wx, wy), lim.max_speed) * ease
 
 
 @njit(cache=True)

@@ -9,10 +9,12 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
+from shapely import LineString
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.version import VERSION
 from quarterdeck.mission.mission import Mission, Route
+from quarterdeck.physics.seen import seen_fraction, whole_tracks
 from quarterdeck.physics.swath import covered_fraction, driven_tracks, planned_tracks
 from quarterdeck.physics.swept import Swept, closest_approaches, excursion, sweep
 from quarterdeck.physics.trace import Trace
@@ -234,6 +236,9 @@ def _figures(
     if mission.spacing is not None and any(route.survey.any() for route in mission.routes):
         planned = covered_fraction(mission.site, planned_tracks(mission.routes), mission.spacing)
         driven = covered_fraction(mission.site, driven_tracks(trace), mission.spacing)
+    elif mission.method == "guards":
+        routes = [LineString(route.xyz[:, :2]) for route in mission.routes if len(route.waypoints) > 1]
+        planned, driven = seen_fraction(mission, routes), seen_fraction(mission, whole_tracks(trace, 0.02))
     moving, sharp = trace.kind > 0, trace.turning
     cross = np.abs(trace.cross.astype(float))
     legs, turns = _cross_track(cross[moving & ~sharp]), _cross_track(cross[moving & sharp & (cross > 0)])

@@ -46,7 +46,7 @@ def give_way(
                 continue
             if abs(position[j, 2] - position[i, 2]) > apart:
                 continue
-            if speed[i] < 0.1:  # about to start: those before it in the list go first
+            if speed[i] < 0.2 * pace[i]:  # about to start: those before it in the list go first
                 if np.hypot(px, py) < apart and i > j:
                     slow[i] = 0.0
                 continue
@@ -71,8 +71,8 @@ def give_way(
             if meeting > 2.62 and abs(bearing) < 1.6:  # head-on: both to starboard
                 want[i] = apart
             elif meeting < 1.17:  # overtaking, or side by side
-                if abs(bearing) < 1.17 and (abs(bearing) < 0.8 or i > j):
-                    slow[i] = min(slow[i], 0.8 * speed[j])
+                if abs(bearing) < 0.8 or (i > j and abs(bearing) < 1.96):
+                    slow[i] = min(slow[i], 0.7 * speed[j])
             elif bearing < 0.0:  # crossing, the other to starboard: let it pass ahead
                 slow[i] = min(slow[i], 0.35 * pace[i])
                 if meeting > 2.0:

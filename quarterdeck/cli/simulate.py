@@ -52,6 +52,8 @@ class Limit(click.ParamType):
 @click.command(short_help="Execute a plan in PyBullet; report and verdict.")
 @click.argument("plan")
 @click.option("--report", metavar="FILE", help="Write the report as JSON.")
+@click.option("--rrd", metavar="FILE", help="Record the run for rerun.")
+@click.option("--picture", metavar="FILE", help="Draw plan, tracks and misses as a PNG.")
 @click.option("--current", type=Vector(), default="0,0", show_default=True, help="Water's motion, m/s east and north.")
 @click.option("--wind", type=Vector(), default="0,0", show_default=True, help="Mean wind, m/s towards east and north.")
 @click.option(
@@ -82,6 +84,8 @@ class Limit(click.ParamType):
 def command(
     plan: str,
     report: str | None,
+    rrd: str | None,
+    picture: str | None,
     current: tuple[float, float],
     wind: tuple[float, float],
     gusts: float,
@@ -101,12 +105,13 @@ def command(
     Exit status 1 if the verdict fails.
     """
     from quarterdeck.geo.errors import InputError
+    from quarterdeck.geo.files import write_file
     from quarterdeck.geo.reader import read_obstacles
     from quarterdeck.mission.planfile import read_plan
     from quarterdeck.physics.sensing import Sensing
     from quarterdeck.physics.simulate import simulate
 
-    for name in (report,):  # told before the run, not after it
+    for name in (report, rrd, picture):  # told before the run, not after it
         if name and name != "-" and Path(name).exists() and not force:
             raise InputError(f"{name} exists; give --force to overwrite it, or another name")
     mission = read_plan(plan)
@@ -127,6 +132,14 @@ def command(
         )
     if report:
         emit(run.report.to_json(), report, force=force)
+    if rrd:
+        from quarterdeck.exporters.recording import recording
+
+        write_file(Path(rrd), recording(mission, run.trace), force=force)
+    if picture:
+        from quarterdeck.exporters.picture import picture as draw
+
+        write_file(Path(picture), draw(mission, run.trace, run.report), force=force)
     if as_json:
         emit(run.report.to_json(), "-", force=force)
     print_report(mission, run.report)

@@ -38,6 +38,14 @@ def test_report_by_the_schema_and_exit_0(plan, tmp_path, capfd):
     assert "passed" in err
 
 
+def test_recording_and_picture_are_written(plan, tmp_path):
+    """Both files, of the kinds that they say they are."""
+    rrd, png = tmp_path / "run.rrd", tmp_path / "run.png"
+    assert run(plan, "--rrd", rrd, "--picture", png) == 0
+    assert rrd.read_bytes()[:4] == b"RRF2"
+    assert png.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
 def test_failed_verdict_exits_1_and_names_the_limit(plan, capfd):
     """A limit that cannot be met."""
     assert run(plan, "--limit", "delay=0.5") == 1

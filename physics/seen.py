@@ -1,0 +1,48 @@
+"""What robots of limited range see from their tracks: what of the area is in sight of some place on them, walls counted."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from shapely import LineString
+
+from quarterdeck.coverage.guards.certificate import uncovered
+from quarterdeck.coverage.guards.space import space_of
+from quarterdeck.geo.scenario import Scenario
+from quarterdeck.geo.triangulation import triangulate
+from quarterdeck.geo.visibility import visibility_polygons
+from quarterdeck.mission.mission import Mission
+from quarterdeck.physics.trace import Trace
+
+STRIDE = 0.1  # of the range: how far apart the looks along a track are
+BATCH = 500  # views united at a time
+
+
+def seen_fraction(mission: Mission, tracks: Sequence[LineString]) -> float:
+    """Return the part of the coverable area, from 0 to 1, that is seen from `tracks` in metres within the plan's range.
+
+    Looks are STRIDE of the range apart, and at every vertex; views are polygons inscribed in what is seen, so that the
+    figure is never too high.
+    """
+    reach = float(mission.parameters["range"])
+    space = space_of(Scenario(mission.name, mission.frame, mission.site, mission.vehicles))
+    places = [shapely.get_coordinates(shapely.segmentize(track, STRIDE * reach)) for track in tracks]
+    if not places:
+        return 0.0
+    looks = np.unique(np.round(np.vstack(places), 3), axis=0)
+    mesh = triangulate(space.sight)
+    views = [
+        shapely.union_all(visibility_polygons(mesh, looks[first : first + BATCH], reach))
+        for first in range(0, len(looks), BATCH)
+    ]
+    return float(1.0 - uncovered(space, np.array(views)).area / space.target.area)
+
+
+def whole_tracks(trace: Trace, tolerance: float) -> list[LineString]:
+    """Return everything that was driven, a line for each vehicle, thinned by no more than `tolerance` metres."""
+    lines = [
+        LineString(np.column_stack([trace.x[:, i], trace.y[:, i]]))
+        for i in range(len(trace.vehicles))
+        if len(trace.time) > 1
+    ]
+    return list(shapely.simplify(lines, tolerance, preserve_topology=False))
