@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -11,48 +12,80 @@ from quarterdeck.geo.dubins import CHORD, dubins_paths
 from quarterdeck.mission.mission import Leg
 
 COARSE = math.radians(30.0)  # between the waypoints of a curve: 3.4 % of the radius off it, and autopilots hold few
+PACES = (1.0, 0.5, 0.25)  # parts of full speed at which a curve is tried
+BACKS = (0.0, 1.0, 2.0, 3.0)  # radii before the corner at which a curve may begin
 REVERSAL = math.radians(150.0)  # a sharper bend is driven past, and come back to on a curve
 
 
-def with_turns(
-    points: np.ndarray, legs: Sequence[Leg], radius: float, space: MultiPolygon
-) -> tuple[np.ndarray, list[Leg], list[np.ndarray]]:
+@dataclass(frozen=True, slots=True)
+class Driven:
+    """A path with its turns: (n, 2) metres, the kind of each leg, its speed as a part of the vehicle's (a tighter curve is
+    driven slower), and the corners (2,) for which no curve has room: they stay as they are.
+    """
+
+    points: np.ndarray
+    legs: list[Leg]
+    pace: np.ndarray
+    stuck: list[np.ndarray]
+
+
+def with_turns(points: np.ndarray, legs: Sequence[Leg], radius: float, space: MultiPolygon) -> Driven:
     """Put a Dubins curve, of legs `turn`, wherever an arc of `radius` metres does not fit between two legs.
 
-    `points` (n, 2) metres, `legs[i]` ends at point i; curves stay inside `space`. Returns the points, their legs, and the
-    corners (2,) for which no curve has room: they stay as they are. Corners that an arc rounds need nothing: the vehicle
-    cuts them. Of two corners that are too near to each other, one curve makes both.
+    `points` (n, 2) metres, `legs[i]` ends at point i; curves stay inside `space`. Where one at full speed has no room, one
+    at half or a quarter of it, and of the radius, may. Corners that an arc rounds need nothing: the vehicle cuts them. Of
+    two corners that are too near to each other, one curve makes both.
     """
     points = np.asarray(points, dtype=float)
     if radius <= 0 or len(points) < 3:
-        return points, list(legs), []
+        return Driven(points, list(legs), np.ones(len(points)), [])
     heading, bend, length = _bends(points)
     reversal = np.abs(bend) > REVERSAL
     tangent = np.where(reversal, 0.0, radius * np.tan(np.abs(bend) / 2))
     crowded = tangent[:-1] + tangent[1:] > length + 1e-9
     shapely.prepare(space)
-    out, kinds, stuck = [points[0]], [legs[0]], []
+    out, kinds, pace, stuck = [points[0]], [legs[0]], [1.0], []
     i = 1
     while i < len(points):
+        out.append(points[i])
+        kinds.append(legs[i])
+        pace.append(1.0)
         last = i == len(points) - 1
         if last or not (reversal[i] or crowded[i - 1] or crowded[i]) or abs(bend[i]) < 1e-6:
-            out.append(points[i])
-            kinds.append(legs[i])
             i += 1
             continue
         j = i + 1 if crowded[i] and not reversal[i] and i + 2 < len(points) and abs(bend[i + 1]) > 1e-6 else i
-        start, goal = (*points[i], heading[i - 1]), (*points[j], heading[j])
-        curve = next((c for c in dubins_paths(start, goal, radius, COARSE) if space.covers(LineString(c))), None)
-        out.append(points[i])
-        kinds.append(legs[i])
+        part, curve = _curve(points, heading, length, i, j, radius, space)
         if curve is None:
             stuck.append(points[i])
             i += 1
             continue
+        out[-1] = curve[0]
         out += list(curve[1:])
         kinds.extend(["turn"] * (len(curve) - 1))
+        pace += [part] * (len(curve) - 1)
         i = j + 1
-    return np.array(out), kinds, stuck
+    return Driven(np.array(out), kinds, np.array(pace), stuck)
+
+
+def _curve(
+    points: np.ndarray, heading: np.ndarray, length: np.ndarray, i: int, j: int, radius: float, space: MultiPolygon
+) -> tuple[float, np.ndarray | None]:
+    """Return the pace and the (m, 2) points of a curve inside `space` from the leg before corner i to that after corner j.
+
+    It begins at the corner or, where there is no room beyond it, some radii before, and ends as far after.
+    """
+    into, out_of = (np.array([math.cos(h), math.sin(h)]) for h in (heading[i - 1], heading[j]))
+    for part in PACES:
+        for back in BACKS:
+            off = back * part * radius
+            if off > 0.8 * min(length[i - 1], length[j]):
+                break
+            start, goal = points[i] - off * into, points[j] + off * out_of
+            for curve in dubins_paths((*start, heading[i - 1]), (*goal, heading[j]), part * radius, COARSE):
+                if space.covers(LineString(curve)):
+                    return part, curve
+    return 1.0, None
 
 
 def driven(points: np.ndarray, radius: float) -> np.ndarray:

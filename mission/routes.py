@@ -53,21 +53,19 @@ def line_routes(
     routes, reasons = [], []
     for i, (vehicle, own, road) in enumerate(zip(vehicles, lines, roads, strict=True)):
         points, legs, missing = _linked(vehicle, own, road)
-        points, legs, stuck = with_turns(points, legs, vehicle.turn_radius, road.polygon)
+        path = with_turns(points, legs, vehicle.turn_radius, road.polygon)
         reasons += missing + [
             f"{vehicle.id}: no room to turn at {vehicle.turn_radius:g} m, {x:.0f} m east and {y:.0f} m north of the centre"
-            for x, y in stuck
+            for x, y in path.stuck
         ]
-        height = np.zeros(len(points))
-        flies = vehicle.domain == "aerial" and len(points) > 1
-        if flies:
-            survey = np.array([leg == "survey" for leg in legs])
-            height = np.where(survey, vehicle.altitude, vehicle.altitude + (i + 1) * LAYER_STEP)
+        xyz, kinds, pace = np.column_stack([path.points, np.zeros(len(path.points))]), path.legs, path.pace
+        if vehicle.domain == "aerial" and len(xyz) > 1:
+            survey = np.array([leg == "survey" for leg in kinds])
+            xyz[:, 2] = np.where(survey, vehicle.altitude, vehicle.altitude + (i + 1) * LAYER_STEP)
+            xyz, kinds = _with_takeoff(xyz, kinds)
+            pace = np.ones(len(xyz))
         wait = _launch_delay(vehicles, i)
-        xyz = np.column_stack([points, height])
-        if flies:
-            xyz, legs = _with_takeoff(xyz, legs)
-        route = timed_route(vehicle, xyz, legs, holds=[wait, *[0.0] * (len(xyz) - 1)])
+        route = timed_route(vehicle, xyz, kinds, holds=[wait, *[0.0] * (len(xyz) - 1)], pace=pace)
         routes.append(route)
         reasons += shortfalls(vehicle, route)
     return tuple(routes), reasons

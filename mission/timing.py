@@ -16,6 +16,7 @@ def timed_route(
     points: np.ndarray,
     legs: Sequence[Leg],
     *,
+    pace: Sequence[float] | np.ndarray | None = None,
     holds: Sequence[float] | None = None,
     tasks: Sequence[str | None] | None = None,
 ) -> Route:
@@ -36,9 +37,10 @@ def timed_route(
         if i:
             flat = math.hypot(x - points[i - 1, 0], y - points[i - 1, 1])
             climb = abs(z - points[i - 1, 2])
-            seconds = max(flat / vehicle.speed, climb / vehicle.model.climb_rate if climb else 0.0)
+            pace_here = 1.0 if pace is None else float(pace[i])
+            seconds = max(flat / (pace_here * vehicle.speed), climb / vehicle.model.climb_rate if climb else 0.0)
             speed = math.hypot(flat, climb) / seconds if seconds else vehicle.speed
-            energy += vehicle.model.power(vehicle.speed if flat else 0.0) * (seconds + turns[i - 1])
+            energy += vehicle.model.power(pace_here * vehicle.speed if flat else 0.0) * (seconds + turns[i - 1])
             time += seconds + turns[i - 1]
         waypoints.append(Waypoint(x, y, z, legs[i], speed, waits[i], time, names[i]))
         time += waits[i]

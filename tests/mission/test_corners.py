@@ -24,9 +24,9 @@ def curvature(points):
 def test_wide_corners_stay():
     """Where arcs fit nothing is added, and the driven line keeps the radius and cuts the corner by what geometry says."""
     line = np.array([[0, 0], [100, 0], [100, 100], [0, 100.0]])
-    points, _, stuck = with_turns(line, ["start", "survey", "survey", "survey"], 10.0, SEA)
-    assert np.array_equal(points, line)
-    assert not stuck
+    path = with_turns(line, ["start", "survey", "survey", "survey"], 10.0, SEA)
+    assert np.array_equal(path.points, line)
+    assert not path.stuck
     track = driven(line, 10.0)
     assert curvature(track) > 9.9
     assert math.isclose(LineString(track).distance(Point(100, 0)), 10 * (math.sqrt(2) - 1), rel_tol=1e-2)
@@ -37,9 +37,10 @@ def test_wide_corners_stay():
 def test_narrow_u_turns_become_curves(gap, radius):
     """A U-turn narrower than the vehicle's becomes a curve of its radius that ends on the next line in its direction."""
     line = np.array([[0, 0], [300, 0], [300, gap], [0, gap]])
-    points, legs, stuck = with_turns(line, ["start", "survey", "survey", "survey"], radius, SEA)
-    assert not stuck
-    assert len(points) == len(legs)
+    path = with_turns(line, ["start", "survey", "survey", "survey"], radius, SEA)
+    points, legs = path.points, path.legs
+    assert not path.stuck
+    assert len(points) == len(legs) == len(path.pace)
     assert curvature(points) > 0.9 * radius or "turn" not in legs
     assert curvature(driven(points, radius)) > 0.9 * radius or "turn" in legs
     assert np.allclose(points[-1], line[-1])
@@ -48,8 +49,8 @@ def test_narrow_u_turns_become_curves(gap, radius):
 
 def test_no_room_is_told():
     """In a channel too narrow to turn, the corner is returned as stuck and stays."""
-    channel = MultiPolygon([box(-1, -1, 101, 11)])
+    channel = MultiPolygon([box(-1, -1, 101, 10.5)])
     line = np.array([[0, 0], [100, 0], [100, 10], [0, 10.0]])
-    points, _, stuck = with_turns(line, ["start", "survey", "survey", "survey"], 20.0, channel)
-    assert len(stuck) >= 1
-    assert np.array_equal(points, line)
+    path = with_turns(line, ["start", "survey", "survey", "survey"], 80.0, channel)
+    assert len(path.stuck) >= 1
+    assert np.array_equal(path.points, line)
