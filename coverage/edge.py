@@ -29,28 +29,34 @@ ONE_VEHICLE = 0.9  # and when this much of it is nearest to one vehicle's tracks
 
 
 def lay_tracks(
-    area: MultiPolygon, grid: Grid, tours: Sequence[np.ndarray], *, edge: Edge = "cells", turn_cost: float | None = None
+    area: MultiPolygon,
+    grid: Grid,
+    tours: Sequence[np.ndarray],
+    *,
+    edge: Edge = "cells",
+    target: MultiPolygon | None = None,
+    turn_cost: float | None = None,
 ) -> list[np.ndarray]:
-    """Return each vehicle's closed track, (n, 2) metres with the first point repeated at the end, all inside `area`.
+    """Return the closed track of each tour, (n, 2) metres with the first point repeated at the end, all inside `area`.
 
-    `area` is what the grid was placed on, `tours` are each vehicle's (n, 2) path cells in order (`coverage.tour`), at
-    least one cell each; a track begins at the first cell of its tour. `turn_cost` is the length in metres that is worth
-    one turn less (None: a tenth of the spacing when reaching out, and half of it for the choice between a lap and
-    many short reaches). Raises InputError if `edge` is not known.
+    `area` is what the grid was placed on; `target` what is to be covered, where that is more (None: the same). `tours` are
+    (n, 2) path cells in order (`coverage.tour`); a track begins at the first cell of its tour. `turn_cost` is the length
+    in metres that is worth one turn less (None: a twentieth of the spacing when reaching out, half of it for the choice
+    between a lap and many short reaches). Raises InputError if `edge` is not known.
     """
     if edge not in get_args(Edge):
         raise InputError(f"edge {edge!r} is not one of {', '.join(get_args(Edge))}")
-    if edge == "whole":
-        paths = [np.asarray(t)[:, ::-1].astype(float) for t in tours]
-    else:
-        local = _to_lattice(shapely.normalize(area), grid)
-        turn = 0.05 if turn_cost is None else turn_cost / grid.spacing
+    if edge == "cells":
+        tours = hang(grid, tours)
+    paths = [np.asarray(t)[:, ::-1].astype(float) for t in tours]
+    if edge != "whole" and paths:
+        space = _to_lattice(shapely.normalize(area), grid)
+        wanted = space if target is None else _to_lattice(shapely.normalize(target), grid)
+        turn = None if turn_cost is None else turn_cost / grid.spacing
         if edge == "cells":
-            paths = [p[:, ::-1].astype(float) for p in hang(grid, tours)]
-            paths = grow(paths, local, least=CHEAP, turn_cost=turn)
+            paths = grow(paths, space, wanted, least=CHEAP, turn_cost=0.05 if turn is None else turn)
         else:
-            paths = [np.asarray(t)[:, ::-1].astype(float) for t in tours]
-            paths = _lap(paths, local, turn if turn_cost is not None else 0.5)
+            paths = _lap(paths, space, wanted, 0.5 if turn is None else turn)
     return [grid.centres(_trimmed(np.vstack([p, p[:1]]))[:, ::-1]) for p in paths]
 
 
@@ -69,16 +75,18 @@ def _trimmed(path: np.ndarray) -> np.ndarray:
     return path[np.concatenate([[True], ~on, [True]])]
 
 
-def _lap(paths: list[np.ndarray], area: MultiPolygon, turn_cost: float) -> list[np.ndarray]:
+def _lap(paths: list[np.ndarray], space: MultiPolygon, wanted: MultiPolygon, turn_cost: float) -> list[np.ndarray]:
     """Return the paths with laps and growth, or growth alone, whichever costs less for what it covers."""
     whole = sum(track_length(np.vstack([p, p[:1]])) for p in paths)
-    limit = (1 + ALLOWANCE) * whole / _covered(paths, area)
-    plans = [_Plan.of(grow(paths, area, least=DEAR, turn_cost=0.0, most_per_area=limit), area, turn_cost)]
-    ringed = _with_rings(paths, area, limit)
-    if ringed is not None:
-        plans.append(_Plan.of(grow(ringed, area, least=DEAR, turn_cost=0.0, most_per_area=limit), area, turn_cost))
+    limit = (1 + ALLOWANCE) * whole / _covered(paths, wanted)
+    ringed = _with_rings(paths, space, wanted, limit)
+    plans = [
+        _Plan.of(grow(start, space, wanted, least=DEAR, turn_cost=0.0, most_per_area=limit), wanted, turn_cost)
+        for start in (paths, ringed)
+        if start is not None
+    ]
     most = max(p.covered for p in plans)
-    return min((p for p in plans if p.covered >= most - 0.002 * area.area), key=lambda p: p.cost).paths
+    return min((p for p in plans if p.covered >= most - 0.002 * wanted.area), key=lambda p: p.cost).paths
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,35 +96,37 @@ class _Plan:
     cost: float
 
     @classmethod
-    def of(cls, paths: list[np.ndarray], area: MultiPolygon, turn_cost: float) -> "_Plan":
+    def of(cls, paths: list[np.ndarray], wanted: MultiPolygon, turn_cost: float) -> "_Plan":
         closed = [np.vstack([p, p[:1]]) for p in paths]
         cost = sum(track_length(t) + turn_cost * count_turns(t) for t in closed)
-        return cls(paths, _covered(paths, area), cost)
+        return cls(paths, _covered(paths, wanted), cost)
 
 
-def _covered(paths: list[np.ndarray], area: MultiPolygon) -> float:
+def _covered(paths: list[np.ndarray], wanted: MultiPolygon) -> float:
     closed = [np.vstack([p, p[:1]]) for p in paths]
-    return float(shapely.intersection(area, swath(closed, 1.0), grid_size=1e-6).area)
+    return float(shapely.intersection(wanted, swath(closed, 1.0), grid_size=1e-6).area)
 
 
-def _with_rings(paths: list[np.ndarray], area: MultiPolygon, limit: float) -> list[np.ndarray] | None:
+def _with_rings(
+    paths: list[np.ndarray], space: MultiPolygon, wanted: MultiPolygon, limit: float
+) -> list[np.ndarray] | None:
     """Return the paths with a lap half a spacing inside each border that pays, best first, or None if none does."""
-    inner = area.buffer(-TOLERANCE, join_style="mitre")
+    inner = space.buffer(-TOLERANCE, join_style="mitre")
     shapely.prepare(inner)
-    inset = shapely.simplify(area.buffer(-0.5 - 1e-3, join_style="mitre", mitre_limit=3.0), 1e-3)
+    inset = shapely.intersection(wanted.buffer(-0.5, join_style="mitre", mitre_limit=3.0), inner.buffer(-1e-3))
+    inset = shapely.simplify(inset, 5e-4)
     rings = [np.array(r.coords) for r in shapely.get_rings(shapely.get_parts(inset))]
-    rest = shapely.difference(area, swath([np.vstack([p, p[:1]]) for p in paths], 1.0), grid_size=1e-6)
-    gains = [shapely.intersection(rest, swath([r], 1.0), grid_size=1e-6).area for r in rings]
-    length = sum(track_length(np.vstack([p, p[:1]])) for p in paths)
-    covered, paths, changed = area.area - rest.area, list(paths), False
+    rest = shapely.difference(wanted, swath([np.vstack([p, p[:1]]) for p in paths], 1.0), grid_size=1e-6)
+    swept = [swath([r], 1.0) for r in rings]
+    gains = [shapely.intersection(rest, w, grid_size=1e-6).area for w in swept]
+    paths, changed = list(paths), False
     for n in sorted(range(len(rings)), key=lambda n: -gains[n] / track_length(rings[n])):
-        added = track_length(rings[n])
-        if gains[n] < RING_PAYS * added or length + added > limit * (covered + gains[n]):
-            continue
-        spliced = _spliced(paths, rings[n], inner)
+        left = shapely.difference(rest, swept[n], grid_size=1e-6)
+        spliced = _spliced(paths, rings[n], inner) if rest.area - left.area >= RING_PAYS * track_length(rings[n]) else None
         if spliced is not None:
-            paths, changed = spliced, True
-            length, covered = length + added, covered + gains[n]
+            longer = sum(track_length(np.vstack([p, p[:1]])) for p in spliced)
+            if longer <= limit * (wanted.area - left.area):
+                paths, rest, changed = spliced, left, True
     return paths if changed else None
 
 

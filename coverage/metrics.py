@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from shapely import Geometry, MultiPolygon, STRtree
+from shapely import Geometry, LineString, MultiPolygon, STRtree
 
 from quarterdeck.geo.grid import Grid
 
@@ -52,17 +52,19 @@ def uncovered(tracks: Sequence[np.ndarray], area: MultiPolygon, spacing: float) 
 
 
 def swath(tracks: Sequence[np.ndarray], spacing: float) -> Geometry:
-    """Return what is within half of `spacing` of the tracks: their straight pieces buffered at once.
+    """Return what is within half of `spacing` of the tracks: their straight pieces buffered one by one, then united.
 
-    A circle is a polygon of 64 sides within it, so that the area is never overstated. (`union_all` of buffered pieces is
-    slower, and without a precision grid GEOS 3.14 lost 5 % of the area of one union.)
+    Arcs are simplified by a thousandth of the spacing. A circle is a polygon of 64 sides within it, so that the area is not
+    overstated. The union needs its precision grid: without one GEOS 3.14 silently loses up to a fifth of the area of plain
+    lattice tours.
     """
-    pieces = [p for t in tracks for p in (straight_pieces(t),) if len(p)]
+    lines = [np.asarray(t, dtype=float).reshape(-1, 2) for t in tracks if len(t)]
+    lines = [shapely.get_coordinates(shapely.simplify(LineString(t), 1e-3 * spacing)) if len(t) > 1 else t for t in lines]
+    pieces = [straight_pieces(t) for t in lines]
     if not pieces:
         return MultiPolygon()
-    widened = shapely.buffer(shapely.linestrings(np.concatenate(pieces)), spacing / 2.0, quad_segs=16)
-    # Without a grid GEOS's union of many shapes that share edges has lost one per cent of the area, silently.
-    return shapely.union_all(widened, grid_size=1e-5 * spacing)
+    capsules = shapely.buffer(shapely.linestrings(np.concatenate(pieces)), spacing / 2.0, quad_segs=16)
+    return shapely.union_all(capsules, grid_size=1e-6 * spacing)
 
 
 def straight_pieces(track: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ hypervertices are counted by scanline, so that an evaluation costs microseconds.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -14,13 +14,14 @@ from shapely import MultiPolygon
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.grid import Grid, area_edges, lay_grid, turned
-from quarterdeck.geo.scanline import held
+from quarterdeck.geo.scanline import best_shifts, held
 
 Method = Literal["annealed", "paper", "none"]
 State = tuple[float, float, float]  # shift x, shift y in path cells, angle
 Target = tuple[float, float, float, float]  # the area in path cells, k1, k2, k3
 
-TRIES = 80  # steps of the refinement of one state
+TRIES = 30  # steps of the refinement of one state
+DEAR = 30_000  # path cells
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,16 +47,17 @@ class Objective:
 class Annealing:
     """The constants of Algorithm 1: temperature `t` falls to `t_min` by factors `alpha`, `k` states at each.
 
-    `gamma` is the chance that a neighbour lies in the negative direction. `refined`: how many of the best states met are
-    refined by a pattern search (0: none, as printed).
+    `gamma` is the chance that a neighbour lies in the negative direction. `refined`: how many of the temperatures' best
+    states are refined (0: none, as printed). Where states are dear, on areas of more than `DEAR` path cells, `k` and
+    `refined` are lessened: the border, which is what a better place wins, is a small part of such an area.
     """
 
     t: float = 0.1
     t_min: float = 0.0005
-    alpha: float = 0.9
-    k: int = 200
+    alpha: float = 0.95
+    k: int = 30
     gamma: float = 0.5
-    refined: int = 24
+    refined: int = 100
 
     def __post_init__(self) -> None:
         """Check that the schedule ends. Raises InputError."""
@@ -101,6 +103,8 @@ def place(
     centre = edges[:, :2].mean(axis=0)
     edges = (edges - np.tile(centre, 2)) / spacing
     target = (area.area / spacing**2, objective.k1, objective.k2, objective.k3)
+    less = min(1.0, DEAR / target[0])
+    annealing = replace(annealing, k=math.ceil(less * annealing.k), refined=math.ceil(less * annealing.refined))
     rng, literal = np.random.default_rng(seed), method == "paper"
     if method == "none":
         theta = angle or 0.0
@@ -208,17 +212,25 @@ def _wrapped(x: float, y: float, angle: float, fixed: float | None) -> State:
 def _refine(
     edges: np.ndarray, target: Target, fixed: float | None, states: list[State], rng: np.random.Generator
 ) -> tuple[State, int]:
-    """Refine each state by random pattern search of shrinking steps. Return the best of all, and how many were tried."""
-    results = []
+    """Refine each state by random steps that shrink, each followed by the best shifts along either axis.
+
+    Returns the best state of all, and how many were tried.
+    """
+    results, tried = [], 0
     for state in states:
         current, size = index(edges, target, state)[0], 1.0
-        for step in rng.normal(0.0, (0.3, 0.3, 0.06), (TRIES, 3)):
-            x, y, angle = (s + size * d for s, d in zip(state, step, strict=True))
-            new_state = _wrapped(x, y, angle, fixed)
-            new = index(edges, target, new_state)[0]
+        for dx, dy, turn in rng.normal(0.0, (0.3, 0.3, 0.06), (TRIES, 3)):
+            x, y, angle = _wrapped(state[0] + size * dx, state[1] + size * dy, state[2] + size * turn, fixed)
+            near = [(x, y, angle)]
+            near += [(float(v), y, angle) for v in best_shifts(edges, y, angle, 2)]
+            x = max(near, key=lambda s: index(edges, target, s)[0])[0]
+            near += [(x, float(v), angle) for v in best_shifts(edges, -x % 2.0, angle + math.pi / 2, 2)]
+            new, new_state = max((index(edges, target, s)[0], s) for s in near)
+            tried += len(near)
             if new >= current:
                 state, current = new_state, new
             else:
                 size *= 0.95
         results.append((current, state))
-    return max(results)[1], len(states) * (TRIES + 1)
+    best = max(results)[1]
+    return best, tried

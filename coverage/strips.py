@@ -25,27 +25,41 @@ MANY = 5000.0  # path cells uncovered; of more, only those near the tracks are l
 
 
 def grow(
-    paths: Sequence[np.ndarray], area: MultiPolygon, *, least: float, turn_cost: float, most_per_area: float = np.inf
+    paths: Sequence[np.ndarray],
+    space: MultiPolygon,
+    wanted: MultiPolygon,
+    *,
+    least: float,
+    turn_cost: float,
+    most_per_area: float = np.inf,
 ) -> list[np.ndarray]:
-    """Return the closed `paths`, (n, 2) vertices without the first repeated, grown into the rest of `area`.
+    """Return closed `paths`, (n, 2) vertices without the first repeated, grown inside `space` to cover more of `wanted`.
 
     A change is made while it covers at least `least` path cells per path cell of length, `turn_cost` added for each turn,
     and the length of all paths stays within `most_per_area` times the area that they cover.
     """
     paths = [np.asarray(p, dtype=float) for p in paths]
-    low = np.floor(np.array(area.bounds[:2])) - 2.0
-    columns, rows = (int(n) for n in np.ceil(np.array(area.bounds[2:])) + 2.0 - low)
-    walls = _bucket_edges(area_edges(area, 1.0) - np.tile(low, 2), rows, columns)
-    for _ in range(ROUNDS):
+    bounds = np.array(shapely.total_bounds([space, wanted]))
+    low = np.floor(bounds[:2]) - 2.0
+    columns, rows = (int(n) for n in np.ceil(bounds[2:]) + 2.0 - low)
+    walls = _bucket_edges(area_edges(space, 1.0) - np.tile(low, 2), rows, columns)
+    bounded = bool(np.isfinite(most_per_area))
+    kept, rest, budget = paths, None, np.inf
+    for _ in range(ROUNDS + 1):
         closed = [np.vstack([p, p[:1]]) for p in paths]
-        rest = shapely.difference(area, swath(closed, 1.0), grid_size=1e-6)
+        bare = shapely.difference(wanted, swath(closed, 1.0), grid_size=1e-6)
+        left = most_per_area * (wanted.area - bare.area) - sum(track_length(t) for t in closed) if bounded else np.inf
+        if left >= 0.0 or rest is None:
+            kept, rest, budget = paths, bare, left
+        else:  # changes that are close to each other covered less than foreseen: take fewer
+            least *= 1.5
         near = rest if rest.area < MANY else shapely.intersection(rest, swath(closed, 2.0 * DEPTH + 2.0))
-        budget = most_per_area * (area.area - rest.area) - sum(track_length(t) for t in closed)
-        changes = _choose(paths, _points(near, low), low, (rows, columns), walls, least, turn_cost, budget, most_per_area)
+        points = _points(near, low)
+        changes = _choose(kept, points, low, (rows, columns), walls, least, turn_cost, budget, most_per_area)
         if not any(changes):
-            break
-        paths = [_changed(p, c) for p, c in zip(paths, changes, strict=True)]
-    return paths
+            return kept
+        paths = [_changed(p, c) for p, c in zip(kept, changes, strict=True)]
+    return kept
 
 
 def _choose(

@@ -142,3 +142,65 @@ def _by_centre(edges, rows, columns):  # type: ignore[no-untyped-def]
             for c in range(int(np.ceil(x[at] - 0.5)), int(np.ceil(x[at + 1] - 0.5))):
                 free[r, c] = 1
     return free, 0
+
+
+@nb.njit(cache=True)
+def best_shifts(edges, y, angle, most):  # type: ignore[no-untyped-def]
+    """Return up to `most` shifts x at which a lattice at shift `y`, turned by `angle`, holds the most hypervertices.
+
+    Counted exactly for all x at once: in every row of hypervertices each stretch inside loses one where x passes its end
+    and gains one where x passes its beginning. (What pokes in between the row's two tracks is not seen.) Each x is the
+    middle of a range in which the count does not change.
+    """
+    cos, sin = np.cos(angle), np.sin(angle)
+    turned = np.empty_like(edges)
+    for e in range(len(edges)):
+        turned[e, 0] = cos * edges[e, 0] + sin * edges[e, 1]
+        turned[e, 1] = cos * edges[e, 1] - sin * edges[e, 0] - y
+        turned[e, 2] = cos * edges[e, 2] + sin * edges[e, 3]
+        turned[e, 3] = cos * edges[e, 3] - sin * edges[e, 2] - y
+    bottom = 2.0 * np.floor(min(turned[:, 1].min(), turned[:, 3].min()) / 2.0)
+    turned[:, 1] -= bottom
+    turned[:, 3] -= bottom
+    rows = int(np.ceil(max(turned[:, 1].max(), turned[:, 3].max()) / 2.0))
+    first, x = crossings(turned, 2 * rows)
+    at, change = np.empty(2 * len(x)), np.empty(2 * len(x), np.int64)
+    events, level = 0, 0
+    for r in range(rows):
+        a, b = first[2 * r], first[2 * r + 1]
+        while a + 1 < first[2 * r + 1] and b + 1 < first[2 * r + 2]:
+            begin, end = max(x[a], x[b]) - 0.5, min(x[a + 1], x[b + 1]) - 1.5
+            if end >= begin:
+                level += int(np.floor(end / 2.0) - np.ceil(begin / 2.0)) + 1
+                at[events], change[events] = begin % 2.0, 1
+                at[events + 1], change[events + 1] = end % 2.0, -1
+                level -= 1 if begin % 2.0 == 0.0 else 0  # its gain at 0 comes as an event
+                events += 2
+            if x[a + 1] < x[b + 1]:
+                a += 2
+            else:
+                b += 2
+    order = np.argsort(at[:events], kind="mergesort")
+    count, middle, size = np.empty(events + 1, np.int64), np.empty(events + 1), np.empty(events + 1)
+    before = 0.0
+    for n in range(events + 1):
+        here = at[order[n]] if n < events else 2.0
+        count[n], middle[n], size[n] = level, (before + here) / 2.0, here - before
+        before = here
+        if n < events:
+            level += change[order[n]]
+    best = np.empty(most)
+    taken = 0
+    while taken < most:
+        winner = -1
+        for n in range(events + 1):
+            if size[n] > 1e-9 and (
+                winner < 0 or count[n] > count[winner] or (count[n] == count[winner] and size[n] > size[winner])
+            ):
+                winner = n
+        if winner < 0:
+            break
+        best[taken] = middle[winner]
+        size[winner] = 0.0
+        taken += 1
+    return best[:taken]

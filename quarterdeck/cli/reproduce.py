@@ -4,7 +4,9 @@ import click
 
 from quarterdeck.cli import LazyGroup
 
-PAPERS: dict[str, str] = {}
+PAPERS: dict[str, str] = {
+    "ecdis": "Coverage by several USVs beside an ECDIS.",
+}
 
 
 @click.command(cls=LazyGroup, package="quarterdeck.reproduce", verbs=PAPERS)
