@@ -156,18 +156,19 @@ def _covered_by_one(area: Any, placement: Any, edge: Any) -> dict[str, Any]:
 
 
 NOTES = {
-    "1": """Follows the paper: every optimised placement beats none. Its best POC is the measure by cells: its length of 4.48 km is
-  112 cells of 40 m, 91.4 % of 196,000 m2; ours holds at least as many.
+    "1": """Follows the paper: every optimised placement beats none. Its best POC is the measure by cells: its length of
+  4.48 km is 112 cells of 40 m, 91.4 % of 196,000 m2; ours holds at least as many.
 Does not follow: F2 and F3 need not add coverage. The paper's three optimised rows have one length and differ in POC, which
   112 cells with their four centres inside cannot; most likely its nodes were counted by their centre while their cells
   stuck out. The hypervertices of F1 alone are the most that fit; F2 and F3 only choose among placements near that.
 "As printed" accepts like a minimiser and returns the last state it accepted, so it is little better than chance.""",
     "2": """Follows the paper: coverage hardly depends on the number of vehicles; turns rise with it.
-Does not follow: its 33 km at 100 m between tracks cover 3.3 km2, not 97 % of 20 km2, which takes about 195 km. Its time for
-  50 vehicles is ten times that for 20; ours is not. Whole hypervertices alone do not reach its POC; with edge cells they do.
+Does not follow: its 33 km at 100 m between tracks cover 3.3 km2, not 97 % of 20 km2, which takes about 195 km. Its time
+  for 50 vehicles is ten times that for 20; ours is not. Whole hypervertices alone do not reach its POC; with the free
+  cells at the edge they do.
 Its shares are not stated (Fig. 7's belong to the figure): ours are the site's for 5 vehicles, equal for the others.""",
-    "delta": """The paper says that an optimised placement covers more than 97 % at delta = 10 m. By the swath, whole hypervertices
-  alone do not reach that here; with the free cells at the edge, or a lap, it holds at delta = 20 m already.""",
+    "delta": """The paper says that an optimised placement covers more than 97 % at delta = 10 m. By the swath, whole
+  hypervertices alone do not reach that here; with the free cells at the edge, or a lap, it holds at 20 m already.""",
 }
 TITLES = {
     "1": "Table I: Dalian harbour, 196,000 m2, 1 USV, delta = 20 m (40 m between tracks), whole hypervertices",
