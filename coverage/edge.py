@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 from shapely import LineString, MultiPolygon, STRtree
 
-from quarterdeck.coverage.metrics import count_turns, swath, track_length
+from quarterdeck.coverage.metrics import count_turns, track_length, uncovered
 from quarterdeck.coverage.strips import grow
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.grid import TOLERANCE, Grid
@@ -104,7 +104,7 @@ class _Plan:
 
 def _covered(paths: list[np.ndarray], wanted: MultiPolygon) -> float:
     closed = [np.vstack([p, p[:1]]) for p in paths]
-    return float(shapely.intersection(wanted, swath(closed, 1.0), grid_size=1e-6).area)
+    return float(wanted.area - uncovered(closed, wanted, 1.0).area)
 
 
 def _with_rings(
@@ -116,12 +116,11 @@ def _with_rings(
     inset = shapely.intersection(wanted.buffer(-0.5, join_style="mitre", mitre_limit=3.0), inner.buffer(-1e-3))
     inset = shapely.simplify(inset, 5e-4)
     rings = [np.array(r.coords) for r in shapely.get_rings(shapely.get_parts(inset))]
-    rest = shapely.difference(wanted, swath([np.vstack([p, p[:1]]) for p in paths], 1.0), grid_size=1e-6)
-    swept = [swath([r], 1.0) for r in rings]
-    gains = [shapely.intersection(rest, w, grid_size=1e-6).area for w in swept]
+    rest = uncovered([np.vstack([p, p[:1]]) for p in paths], wanted, 1.0)
+    gains = [rest.area - uncovered([r], rest, 1.0).area for r in rings]
     paths, changed = list(paths), False
     for n in sorted(range(len(rings)), key=lambda n: -gains[n] / track_length(rings[n])):
-        left = shapely.difference(rest, swept[n], grid_size=1e-6)
+        left = uncovered([rings[n]], rest, 1.0)
         spliced = _spliced(paths, rings[n], inner) if rest.area - left.area >= RING_PAYS * track_length(rings[n]) else None
         if spliced is not None:
             longer = sum(track_length(np.vstack([p, p[:1]])) for p in spliced)

@@ -8,6 +8,7 @@ import shapely
 from shapely import Geometry, LineString, MultiPolygon, STRtree
 
 from quarterdeck.geo.grid import Grid
+from quarterdeck.geo.scenario import as_multipolygon
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +47,9 @@ def measure(tracks: Sequence[np.ndarray], area: MultiPolygon, grid: Grid) -> Fig
     )
 
 
-def uncovered(tracks: Sequence[np.ndarray], area: MultiPolygon, spacing: float) -> Geometry:
+def uncovered(tracks: Sequence[np.ndarray], area: MultiPolygon, spacing: float) -> MultiPolygon:
     """Return the part of `area` farther than half of `spacing` from every track."""
-    return shapely.difference(area, swath(tracks, spacing), grid_size=1e-6 * spacing)
+    return as_multipolygon(shapely.difference(area, swath(tracks, spacing), grid_size=1e-6 * spacing))
 
 
 def swath(tracks: Sequence[np.ndarray], spacing: float) -> Geometry:

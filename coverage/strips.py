@@ -14,9 +14,10 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon
 
-from quarterdeck.coverage.metrics import swath, track_length
+from quarterdeck.coverage.metrics import swath, track_length, uncovered
 from quarterdeck.geo.grid import area_edges
 from quarterdeck.geo.scanline import crossings
+from quarterdeck.geo.scenario import as_multipolygon
 
 PITCH = 0.05  # between the points that stand for what is uncovered
 DEPTH = 1.6  # how far a bulge or spur reaches at once; a later round goes on from there
@@ -47,13 +48,13 @@ def grow(
     kept, rest, budget = paths, None, np.inf
     for _ in range(ROUNDS + 1):
         closed = [np.vstack([p, p[:1]]) for p in paths]
-        bare = shapely.difference(wanted, swath(closed, 1.0), grid_size=1e-6)
+        bare = uncovered(closed, wanted, 1.0)
         left = most_per_area * (wanted.area - bare.area) - sum(track_length(t) for t in closed) if bounded else np.inf
         if left >= 0.0 or rest is None:
             kept, rest, budget = paths, bare, left
         else:  # changes that are close to each other covered less than foreseen: take fewer
             least *= 1.5
-        near = rest if rest.area < MANY else shapely.intersection(rest, swath(closed, 2.0 * DEPTH + 2.0))
+        near = rest if rest.area < MANY else as_multipolygon(rest.intersection(swath(closed, 2.0 * DEPTH + 2.0)))
         points = _points(near, low)
         changes = _choose(kept, points, low, (rows, columns), walls, least, turn_cost, budget, most_per_area)
         if not any(changes):
