@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from quarterdeck.geo.errors import InputError
-from quarterdeck.mission.director import Director, fixed
+from quarterdeck.mission.director import Director
+from quarterdeck.mission.inspection import default_director
 from quarterdeck.mission.mission import Mission
 from quarterdeck.physics.faults import read_faults
 from quarterdeck.physics.report import Report, measure
@@ -41,7 +42,7 @@ def simulate(
     duration: float | None = None,
     progress: Callable[[float, float], None] | None = None,
 ) -> Run:
-    """Execute `mission` in PyBullet under `director` (default: fixed routes) and judge it.
+    """Execute `mission` in PyBullet under `director` (default: its routes, or its schedule of tasks) and judge it.
 
     `step` seconds a PyBullet step (at most 0.1; the models integrate in smaller ones), `sample` seconds between
     samples of the trace (default: every step). `current` and `wind` are (east, north) m/s, `gusts` the standard
@@ -58,7 +59,7 @@ def simulate(
     until = 2.0 * planned + 600.0 if duration is None else duration
     ids = [v.id for v in mission.vehicles]
     befalling, sensing = read_faults(faults, ids, planned, seed), sensing or Sensing()
-    known, director = mission.site, director or fixed(mission)
+    known, director = mission.site, director or default_director(mission)
     if sensing.unmapped:
         mission = replace(mission, site=replace(known, obstacles=(*known.obstacles, *sensing.unmapped)))
     with open_world(step) as world:

@@ -11,6 +11,7 @@ from quarterdeck import __version__
 from quarterdeck.geo.errors import QuarterdeckError
 
 VERBS = {
+    "assign": "Visit tasks with priority, time and precedence.",
     "check": "Every problem of a site or a plan.",
     "export": "Autopilot and ECDIS files, recording, pictures.",
     "init": "A small site to start from.",

@@ -1,0 +1,143 @@
+"""How long every vehicle takes between tasks and depots: shortest ways over its occupancy map, turns counted."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from quarterdeck.geo.gridpath import Heuristic, Ways, find_ways, nearest_free
+from quarterdeck.geo.occupancy import Occupancy, site_occupancy
+from quarterdeck.geo.scenario import Scenario, Vehicle
+from quarterdeck.mission.timing import turn_times
+
+CELLS = 1_000_000  # of a map that is made from a site, at most
+CELLS_A_CLEARANCE = 4
+RIGHT_ANGLE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+
+
+@dataclass(frozen=True, slots=True)
+class Travel:
+    """Between n tasks and the depots of k vehicles, which fall into c classes that drive alike.
+
+    `seconds` (c, n, n), `out` and `home` (k, n), `idle` (k,) are times; inf is no way. `kind` (k,) is a vehicle's class.
+    `ways[kind]` has the paths between points: the n tasks, then each vehicle's start, then each vehicle's end.
+    `off` (c, n) is how many metres from a task the vehicle serves it, where its clearance keeps it away.
+    """
+
+    seconds: np.ndarray
+    out: np.ndarray
+    home: np.ndarray
+    idle: np.ndarray
+    kind: np.ndarray
+    ways: tuple[Ways, ...]
+    off: np.ndarray
+
+    def path(self, vehicle: int, i: int, j: int) -> np.ndarray:
+        """Return a vehicle's (q, 2) path in metres between two points of `ways`. Raises ValueError where there is none."""
+        way = self.ways[int(self.kind[vehicle])].path(i, j)
+        if way is None:
+            raise ValueError(f"no way from point {i} to point {j}")
+        return way
+
+
+def travel(
+    scenario: Scenario,
+    twin: Occupancy | None = None,
+    *,
+    resolution: float | None = None,
+    heuristic: Heuristic = "none",
+    plain: bool = False,
+) -> Travel:
+    """Return the travel times of a scenario, on the map `twin` (on the ground and at sea) or one made from the site.
+
+    `resolution` is the made map's in metres; default a quarter of the least clearance, in at most a million cells. A task
+    or depot within a vehicle's clearance of an obstacle is served from the nearest place that is not.
+
+    A vehicle that turns on the spot is given a right angle's turn at each task, since its next leg is not known yet;
+    `plain` times, the paper's, are metres along the grid over speed, no turns.
+    """
+    vehicles, n, k = scenario.vehicles, len(scenario.tasks), len(scenario.vehicles)
+    points = np.array(
+        [*(t.position for t in scenario.tasks), *(v.start for v in vehicles), *(v.home for v in vehicles)], dtype=float
+    ).reshape(-1, 2)
+    step = resolution if resolution is not None else default_resolution(scenario)
+    kinds: dict[tuple[object, ...], int] = {}
+    known: dict[tuple[str, float], tuple[Ways, np.ndarray]] = {}
+    kind = np.zeros(k, np.int64)
+    seconds, turns, ways, off = [], [], [], []
+    for r, v in enumerate(vehicles):
+        key = (v.domain, v.clearance, v.speed, v.turn_radius, v.model.name, v.altitude)
+        if key not in kinds:
+            kinds[key] = len(kinds)
+            if (v.domain, v.clearance) not in known:
+                known[v.domain, v.clearance] = _ways(scenario, v, twin, step, points, heuristic)
+            way, shift = known[v.domain, v.clearance]
+            seconds.append(way.steps / v.speed if plain else _seconds(v, way))
+            turns.append(0.0 if plain else float(turn_times(v, RIGHT_ANGLE)[1]))
+            ways.append(way)
+            off.append(shift[:n])
+        kind[r] = kinds[key]
+    climb = np.array([v.altitude / v.model.climb_rate if v.domain == "aerial" else 0.0 for v in vehicles])
+    start, end = n + np.arange(k), n + k + np.arange(k)
+    whole = np.array(seconds).reshape(-1, n + 2 * k, n + 2 * k)
+    idle = whole[kind, start, end]
+    turn = np.array(turns)
+    return Travel(
+        seconds=whole[:, :n, :n] + turn[:, None, None],
+        out=whole[kind, start, :n] + climb[:, None],
+        home=whole[kind, end, :n] + (climb + turn[kind])[:, None],
+        idle=np.where(idle > 0, idle + 2 * climb, 0.0),
+        kind=kind,
+        ways=tuple(ways),
+        off=np.array(off).reshape(-1, n),
+    )
+
+
+def default_resolution(scenario: Scenario) -> float:
+    """Return the side of a map's cells in metres: a quarter of the least clearance, or what `CELLS` allow."""
+    x0, y0, x1, y1 = scenario.site.operating.bounds
+    least = math.sqrt(max((x1 - x0) * (y1 - y0), 1e-6) / CELLS)
+    return max(least, min((v.clearance for v in scenario.vehicles), default=0.0) / CELLS_A_CLEARANCE)
+
+
+def _ways(
+    scenario: Scenario,
+    vehicle: Vehicle,
+    twin: Occupancy | None,
+    step: float,
+    points: np.ndarray,
+    heuristic: Heuristic,
+) -> tuple[Ways, np.ndarray]:
+    """Return the ways of a domain and clearance, and how far each point was moved to stand free."""
+    if twin is None or vehicle.domain == "aerial":
+        # A path may run anywhere in a cell whose centre is free: half a diagonal is added, so that none cuts the clearance.
+        map_ = site_occupancy(scenario.site, vehicle.domain, step, vehicle.clearance + step * math.sqrt(0.5))
+        free = map_.free()
+    else:
+        map_ = twin
+        free = map_.free(vehicle.clearance)
+    stands = nearest_free(map_, free, points, vehicle.clearance + 2 * map_.resolution)
+    return find_ways(map_, free, stands, heuristic), np.hypot(*(stands - points).T)
+
+
+def _seconds(vehicle: Vehicle, ways: Ways) -> np.ndarray:
+    seconds = ways.lengths / vehicle.speed
+    for i, row in enumerate(ways.paths):
+        for j, path in enumerate(row):
+            if path is not None and len(path) > 2:
+                seconds[i, j] += turn_times(vehicle, path).sum()
+                seconds[j, i] = seconds[i, j]
+    return np.asarray(seconds)
+
+
+def reachable(travel: Travel) -> np.ndarray:
+    """Return (k, n) bool: the vehicle can get to the task and from it to its end."""
+    return np.isfinite(travel.out) & np.isfinite(travel.home)
+
+
+def usable(vehicles: Sequence[Vehicle], reserve: float) -> np.ndarray:
+    """Return (k,) seconds that each vehicle can be out, by endurance and by battery at cruise, less the reserve."""
+    return np.array(
+        [(1 - reserve) * min(v.endurance, v.battery * 3600.0 / v.model.power(v.speed)) for v in vehicles], dtype=float
+    )
