@@ -21,24 +21,46 @@ def improve_tours(
     """Return tours of a makespan not above that of `tours`, found from them by simulated annealing.
 
     `lengths` (m + 2 k, m + 2 k) metres between the m guards, the k robots' starts, then their ends; every guard is on one
-    of the k tours; `speeds` (k,) m/s. With `ranks` (m,), no robot visits a guard before one of a higher rank.
+    of the k tours; `speeds` (k,) m/s. With `ranks` (m,), no robot visits a guard before one of a higher rank, and higher
+    ranks are done as soon as can be, whatever that costs the makespan.
     """
     k = len(tours)
     m = len(lengths) - 2 * k
-    rank = np.zeros(m, dtype=np.int64) if ranks is None else np.asarray(ranks, dtype=np.int64)
-    ordered = [sorted(t, key=lambda g: -rank[g]) for t in tours]  # stable: the tour's own order within a rank
-    width = max(m, 1)
-    rows, sizes = np.full((k, width), -1, dtype=np.int64), np.array([len(t) for t in ordered], dtype=np.int64)
-    for r, tour in enumerate(ordered):
-        rows[r, : len(tour)] = tour
-    if m == 0 or not np.isfinite(lengths).any():
-        return ordered
-    between = np.where(np.isfinite(lengths[:m, :m]), lengths[:m, :m], 1e12)
-    near = np.argsort(between + np.diag(np.full(m, np.inf)), axis=1, kind="stable")[:, : min(12, m - 1)]
-    far = np.where(np.isfinite(lengths), lengths, 1e12)
-    steps = STEPS + STEPS_A_GUARD * m if m > 1 else 0
-    best_rows, best_sizes = _anneal(far, rows, sizes, np.asarray(speeds, dtype=float), rank, near, steps, seed)
-    return [best_rows[r, : best_sizes[r]].tolist() for r in range(k)]
+    rank = np.zeros(m, dtype=np.int64) if ranks is None else np.asarray(ranks)
+    levels = np.unique(rank)[::-1]
+    places, ends = np.arange(m, m + k), np.arange(m + k, m + 2 * k)
+    spent = np.zeros(k)  # seconds until a robot has done the higher ranks
+    orders: list[list[int]] = [[] for _ in range(k)]
+    for level in levels:
+        mine = np.flatnonzero(rank == level)
+        number = {int(g): i for i, g in enumerate(mine)}
+        used = np.concatenate([mine, places, ends])
+        part = np.where(np.isfinite(lengths), lengths, 1e12)[np.ix_(used, used)]
+        if level != levels[-1]:  # not home yet: what counts is when the last of this rank is seen
+            part[:, -k:] = part[-k:, :] = 0.0
+        begin = [[number[g] for g in tour if rank[g] == level] for tour in tours]
+        for robot, order in enumerate(_improved(part, begin, np.asarray(speeds, dtype=float), spent, seed)):
+            walk = [places[robot], *mine[order]]
+            spent[robot] += lengths[walk[:-1], walk[1:]].sum() / speeds[robot]
+            orders[robot] += mine[order].tolist()
+            places[robot] = walk[-1]
+    return orders
+
+
+def _improved(
+    lengths: np.ndarray, tours: Sequence[Sequence[int]], speeds: np.ndarray, spent: np.ndarray, seed: int
+) -> list[list[int]]:
+    """Return shorter tours of one rank, for robots that have spent (k,) seconds already."""
+    k, m = len(tours), len(lengths) - 2 * len(tours)
+    if m < 2:
+        return [list(t) for t in tours]
+    rows, sizes = np.full((k, m), -1, dtype=np.int64), np.array([len(t) for t in tours], dtype=np.int64)
+    for robot, tour in enumerate(tours):
+        rows[robot, : len(tour)] = tour
+    away = lengths[:m, :m] + np.diag(np.full(m, np.inf))
+    near = np.argsort(away, axis=1, kind="stable")[:, : min(12, m - 1)]
+    best, best_sizes = _anneal(lengths, rows, sizes, speeds, spent, near, STEPS + STEPS_A_GUARD * m, seed)
+    return [best[robot, : best_sizes[robot]].tolist() for robot in range(k)]
 
 
 def tour_times(lengths: np.ndarray, tours: Sequence[Sequence[int]], speeds: np.ndarray) -> np.ndarray:
@@ -133,34 +155,25 @@ def _length(d: np.ndarray, row: np.ndarray, size: int, robot: int, m: int, k: in
 
 
 @njit(cache=True)
-def _falls(rank: np.ndarray, row: np.ndarray, size: int) -> bool:
-    for i in range(size - 1):  # noqa: SIM110 - numba
-        if rank[row[i]] < rank[row[i + 1]]:
-            return False
-    return True
-
-
-@njit(cache=True)
 def _anneal(
     d: np.ndarray,
     rows: np.ndarray,
     sizes: np.ndarray,
     speeds: np.ndarray,
-    rank: np.ndarray,
+    spent: np.ndarray,
     near: np.ndarray,
     steps: int,
     seed: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     np.random.seed(seed)  # noqa: NPY002 - numba's own
     k, width = rows.shape
-    m = len(rank)
-    ranked = rank.max() != rank.min()
+    m = len(near)
     rows, sizes = rows.copy(), sizes.copy()
     of, at = np.empty(m, dtype=np.int64), np.empty(m, dtype=np.int64)
     for r in range(k):
         for i in range(sizes[r]):
             of[rows[r, i]], at[rows[r, i]] = r, i
-    time = np.array([_length(d, rows[r], sizes[r], r, m, k) / speeds[r] for r in range(k)])
+    time = np.array([_length(d, rows[r], sizes[r], r, m, k) / speeds[r] + spent[r] for r in range(k)])
     best_rows, best_sizes, best, best_sum = rows.copy(), sizes.copy(), time.max(), time.sum()
     new = np.empty((2, width), dtype=np.int64)
     scale = max(time.max(), 1e-9)
@@ -206,9 +219,7 @@ def _anneal(
                         for q in range(count):
                             new[0, n] = rows[r, i + count - 1 - q] if back else rows[r, i + q]
                             n += 1
-            if ranked and not _falls(rank, new[0], size_r):
-                continue
-            other_r, other_s = _length(d, new[0], size_r, r, m, k) / speeds[r], time[s]
+            other_r, other_s = _length(d, new[0], size_r, r, m, k) / speeds[r] + spent[r], time[s]
             new_r, new_s = size_r, size_s
         else:
             if move <= 1:  # move a stretch behind b
@@ -231,10 +242,8 @@ def _anneal(
                 new_r, new_s = size_r, size_s
                 new[0, :size_r], new[1, :size_s] = rows[r, :size_r], rows[s, :size_s]
                 new[0, i], new[1, j] = b, a
-            if ranked and not (_falls(rank, new[0], new_r) and _falls(rank, new[1], new_s)):
-                continue
-            other_r = _length(d, new[0], new_r, r, m, k) / speeds[r]
-            other_s = _length(d, new[1], new_s, s, m, k) / speeds[s]
+            other_r = _length(d, new[0], new_r, r, m, k) / speeds[r] + spent[r]
+            other_s = _length(d, new[1], new_s, s, m, k) / speeds[s] + spent[s]
         old_r, old_s = time[r], time[s]
         time[r] = other_r
         if r != s:

@@ -43,13 +43,13 @@ def fewer_guards(space: Space, mesh: Triangulation, guards: np.ndarray, reach: f
             covers = vstack([covers, _sees(mesh, places, more, reach)], format="csr")
         full = _completed(views, chosen, rest, enough)
         if full is not None and len(full) < len(best) + 12:
-            kept = _pruned(space, views.of(full), places[full])
+            kept = places[full[~needless(space.target, views.of(full))]]
             if len(kept) < len(best):
                 best, stale = kept, 0
         stale += 1
         if rest.area <= enough or len(chosen) >= len(best) or stale > PATIENCE:
             break
-    return _pruned(space, visibility_polygons(mesh, guards, reach), guards) if best is guards else best
+    return best if best is not guards else guards[~needless(space.target, visibility_polygons(mesh, guards, reach))]
 
 
 class _Views:
@@ -131,9 +131,9 @@ def _completed(views: _Views, chosen: np.ndarray, rest: shapely.MultiPolygon, en
     return np.array(full, dtype=np.int64)
 
 
-def _pruned(space: Space, views: np.ndarray, guards: np.ndarray) -> np.ndarray:
-    """Drop guards, those that alone see least first, while nothing gets lost."""
-    seen = shapely.intersection(views, space.target)
+def needless(target: shapely.MultiPolygon, views: np.ndarray) -> np.ndarray:
+    """Return (k,) bool: views that can go together and nothing of the target is lost; those that see least alone first."""
+    seen = shapely.intersection(views, target)
     tree = shapely.STRtree(views)
     present = np.ones(len(views), dtype=np.bool_)
 
@@ -145,7 +145,7 @@ def _pruned(space: Space, views: np.ndarray, guards: np.ndarray) -> np.ndarray:
     spent = 0.0
     for i in np.argsort([alone(i) for i in range(len(views))], kind="stable"):
         lost = alone(i)
-        if spent + lost <= 0.1 * TOLERANCE * space.target.area:
+        if spent + lost <= 0.1 * TOLERANCE * target.area:
             present[i] = False
             spent += lost
-    return guards[present]
+    return ~present

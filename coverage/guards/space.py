@@ -12,6 +12,7 @@ from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.scenario import Scenario, Vehicle, as_multipolygon
 
 HAIR = 1e-3  # m that a guard keeps from every edge: nearer ones vanish from triangulations, and PLAN files keep 0.1 mm
+BAND = 0.02  # m of the area beside an edge that are seen where the edge is inspected
 DECIMALS = 9  # of a degree, as a PLAN file writes positions
 
 
@@ -50,6 +51,11 @@ def space_of(scenario: Scenario) -> Space:
     if reach.is_empty:
         raise InputError("obstacles and clearance leave the vehicles nowhere to be; give them less clearance")
     return Space(site.coverable, sight, reach, scenario.frame)
+
+
+def border_of(target: MultiPolygon) -> MultiPolygon:
+    """Return the target's rim, a band of BAND metres along the area's border and every obstacle: seen, so is the border."""
+    return as_multipolygon(target.difference(target.buffer(-BAND, join_style="mitre", mitre_limit=2.0)))
 
 
 def _common(vehicles: Sequence[Vehicle], scenario: Scenario) -> MultiPolygon:

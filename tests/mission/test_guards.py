@@ -10,6 +10,7 @@ from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.models import load_model
 from quarterdeck.geo.scenario import Area, Obstacle, Scenario, Site, Vehicle, as_multipolygon
 from quarterdeck.mission.guards import plan_guards
+from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.planfile import plan_text
 
 BORDER = shapely.box(0, 0, 60, 40)
@@ -56,6 +57,59 @@ def test_optimised_is_never_worse_and_the_same_seed_gives_the_same_plan() -> Non
     assert best.figures["makespan"] <= paper.figures["makespan"]
     assert best.figures["paper"]["makespan"] == paper.figures["makespan"]
     assert plan_text(best) == plan_text(plan_guards(given, range=9.0))
+
+
+def test_borders_are_inspected_with_fewer_guards_than_the_area() -> None:
+    """Every edge of area and obstacles is within range and in sight of a guard; the middle of the room need not be."""
+    given = scenario((1, 1), (59, 39))
+    mission = plan_guards(given, range=9.0, inspect="border")
+    assert mission.feasible
+    assert mission.figures["guards"] < plan_guards(given, range=9.0, mode="paper").figures["guards"]
+    guards = shapely.points(shapely.get_coordinates(mission.layers[0].geometries))
+    border = given.site.coverable.boundary
+    steps = [border.interpolate(at) for at in np.arange(0, border.length, 0.5)]
+    free = given.site.coverable.buffer(1e-6)
+    for step in steps:
+        near = guards[shapely.distance(guards, step) <= 9.0]
+        assert any(free.covers(shapely.LineString([g, step])) for g in near)
+
+
+def test_a_part_of_higher_priority_is_seen_first() -> None:
+    """The urgent part is seen whole long before the rest, and sooner than without its priority."""
+    urgent = Area("urgent", as_multipolygon(shapely.box(40, 20, 60, 40)), priority=2)
+    given = scenario((1, 1), (2, 1))
+    part, walls = urgent.polygon.intersection(given.site.coverable), given.site.navigable("ground")
+
+    def seen_at(mission: Mission) -> float:
+        stops = sorted((w.time, w.x, w.y) for route in mission.routes for w in route.waypoints if w.task)
+        at = np.array(stops)
+        return float(
+            next(
+                at[n - 1, 0]
+                for n in range(1, len(at) + 1)
+                if uncovered_by_shadows(part, walls, at[:n, 1:], np.full(n, 12.0)) < 1e-9 * part.area
+            )
+        )
+
+    ranked = replace(given, site=replace(given.site, areas=(*given.site.areas, urgent)))
+    first, plain = plan_guards(ranked, range=12.0), plan_guards(given, range=12.0)
+    assert seen_at(first) < min(seen_at(plain), 0.6 * max(r.duration for r in first.routes))
+
+
+def test_a_robot_of_longer_range_leaves_guards_out() -> None:
+    """With their own ranges the robots still see everything, from fewer guards than all with the shortest."""
+    given = scenario((1, 1), (59, 39))
+    near, far = given.vehicles
+    mixed = replace(given, vehicles=(replace(near, range=12.0), replace(far, range=30.0)))
+    mission = plan_guards(mixed)
+    assert mission.figures["guards"] < plan_guards(given, range=12.0).figures["guards"]
+    layer = mission.layers[0]
+    passed = [i for i, p in enumerate(layer.properties) if p["vehicle"]]
+    ranges = np.array([layer.properties[i]["range"] for i in passed])
+    assert set(ranges) == {12.0, 30.0}
+    site = given.site
+    guards = shapely.get_coordinates(layer.geometries)[passed]
+    assert uncovered_by_shadows(site.coverable, site.navigable("ground"), guards, ranges) < 1e-9 * site.coverable.area
 
 
 @pytest.mark.parametrize(
