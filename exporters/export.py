@@ -21,10 +21,20 @@ AUTOPILOTS: tuple[Autopilot, ...] = ("ardupilot", "px4")
 
 # format: (module, its options, what it is)
 FORMATS: dict[str, tuple[str, dict[str, Any], str]] = {
+    "csv": ("waypoint_table", {}, "every waypoint, a row each"),
     "geojson": ("geojson", {}, "styled routes and site for geojson.io, GitHub, QGIS"),
+    "gpx": ("gpx", {}, "routes for chart plotters, OpenCPN, receivers"),
+    "kml": ("kml", {}, "routes and site for Google Earth"),
+    "kmz": ("kml", {"packed": True}, "the same, zipped"),
+    "moos": ("moos", {}, "MOOS-IvP behaviours"),
+    "nav2": ("nav2", {}, "GPS waypoints for ROS 2's Nav2"),
     "png": ("picture", {}, "map of the plan"),
+    "qgc-plan": ("qgc_plan", {}, "mission, fence and rally points for QGroundControl and MAVSDK"),
     "qgc-wpl": ("qgc_wpl", {}, "mission, fence and rally files for ArduPilot, PX4, Mission Planner, QGroundControl"),
     "rerun": ("recording", {}, "recording for the rerun viewer"),
+    "rtz": ("rtz", {"version": "1.0"}, "routes for ECDIS, version 1.0, the most widely read"),
+    "rtz-1.1": ("rtz", {"version": "1.1"}, "the same, version 1.1"),
+    "rtz-1.2": ("rtz", {"version": "1.2"}, "the same, version 1.2"),
 }
 
 

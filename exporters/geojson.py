@@ -16,7 +16,7 @@ from shapely.geometry.base import BaseGeometry
 
 from quarterdeck.exporters.colours import colours
 from quarterdeck.exporters.export import Settings
-from quarterdeck.geo.files import safe_names
+from quarterdeck.exporters.places import file_stems
 from quarterdeck.geo.frame import Frame
 from quarterdeck.mission.mission import Mission, Route
 
@@ -25,7 +25,7 @@ SURVEY_WIDTH, TRANSIT_WIDTH = 3, 1.5
 
 def files(mission: Mission, settings: Settings) -> dict[str, str]:  # noqa: ARG001 - no autopilot reads it
     """Return one FeatureCollection, `<mission>.geojson`: site, tasks, and each vehicle's survey and other legs."""
-    stem = safe_names([mission.name])[mission.name]
+    stem = file_stems(mission)[0]
     document = {"type": "FeatureCollection", "features": list(_features(mission))}
     return {f"{stem}.geojson": json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1) + "\n"}
 

@@ -13,7 +13,7 @@ from quarterdeck.exporters.colours import colours
 from quarterdeck.exporters.export import Settings
 from quarterdeck.exporters.map_furniture import fill, graticule, north_arrow, scale_bar
 from quarterdeck.exporters.map_panel import AREA, CONTACT, MISSED, OBSTACLE, START, TASK, WATER, legend, table
-from quarterdeck.geo.files import safe_names
+from quarterdeck.exporters.places import file_stems
 from quarterdeck.mission.mission import Mission
 from quarterdeck.physics.report import Report
 from quarterdeck.physics.swath import driven_tracks, planned_tracks
@@ -22,7 +22,7 @@ from quarterdeck.physics.trace import Trace
 
 def files(mission: Mission, settings: Settings) -> dict[str, bytes]:  # noqa: ARG001 - no autopilot reads it
     """Return `<mission>.png`, the map of the plan."""
-    return {f"{safe_names([mission.name])[mission.name]}.png": picture(mission)}
+    return {f"{file_stems(mission)[0]}.png": picture(mission)}
 
 
 def picture(

@@ -9,8 +9,8 @@ from shapely import Polygon
 
 from quarterdeck.exporters.export import Settings
 from quarterdeck.exporters.fence import fence_polygons
-from quarterdeck.exporters.mavlink import GLOBAL, MOST_ITEMS, WAYPOINT, Item, mission_items, tell_limits
-from quarterdeck.geo.files import safe_names
+from quarterdeck.exporters.mavlink import GLOBAL, MOST_ITEMS, RELATIVE, WAYPOINT, Item, mission_items, tell_limits
+from quarterdeck.exporters.places import file_stems
 from quarterdeck.mission.mission import Mission
 
 INCLUSION_VERTEX, EXCLUSION_VERTEX, RALLY_POINT = 5001, 5002, 5100
@@ -18,7 +18,7 @@ INCLUSION_VERTEX, EXCLUSION_VERTEX, RALLY_POINT = 5001, 5002, 5100
 
 def files(mission: Mission, settings: Settings) -> dict[str, str]:
     """Return each vehicle's `<vehicle>.waypoints`, and its geofence and rally point as `.fence.txt` and `.rally.txt`."""
-    stems = safe_names(v.id for v in mission.vehicles)
+    _, stems = file_stems(mission)
     made: dict[str, str] = {}
     tell_limits(mission, settings)
     for route in mission.routes:
@@ -33,7 +33,9 @@ def files(mission: Mission, settings: Settings) -> dict[str, str]:
             )
         made[f"{stem}.waypoints"] = wpl([home, *items])
         made[f"{stem}.fence.txt"] = wpl(_fence_items(mission, route.vehicle))
-        made[f"{stem}.rally.txt"] = wpl([Item(RALLY_POINT, GLOBAL, lat=lat, lon=lon)])
+        made[f"{stem}.rally.txt"] = wpl(
+            [Item(RALLY_POINT, RELATIVE, lat=lat, lon=lon, z=mission.vehicle(route.vehicle).altitude)]
+        )
     return made
 
 

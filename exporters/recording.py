@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from quarterdeck.exporters.colours import colours
 from quarterdeck.exporters.export import Settings
-from quarterdeck.geo.files import safe_names
+from quarterdeck.exporters.places import file_stems
 from quarterdeck.mission.mission import Mission
 from quarterdeck.physics.trace import Trace
 
@@ -24,7 +24,7 @@ CURVES = {"speed": "speed, m/s", "energy": "energy used, Wh", "cross": "off trac
 
 def files(mission: Mission, settings: Settings) -> dict[str, bytes]:  # noqa: ARG001 - no autopilot reads it
     """Return `<mission>.rrd` with the plan."""
-    return {f"{safe_names([mission.name])[mission.name]}.rrd": recording(mission)}
+    return {f"{file_stems(mission)[0]}.rrd": recording(mission)}
 
 
 def recording(mission: Mission, trace: Trace | None = None) -> bytes:
