@@ -1,0 +1,262 @@
+"""Parallel lines: what survey teams with a sonar or a camera expect, within the same division of the area.
+
+Swath, route and path are kept apart, as in Fields2Cover: swaths are the lines that survey, the route is their order
+and directions, paths link the end of one with the beginning of the next.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numba as nb
+import numpy as np
+import shapely
+from scipy.ndimage import distance_transform_edt
+from shapely import MultiPolygon
+
+from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.grid import TOLERANCE, Grid
+from quarterdeck.geo.scenario import as_multipolygon
+from quarterdeck.geo.transit import Roadmap, shortest_path
+
+SHORTEST = 0.1  # of the spacing: shorter pieces of lines are not worth going to
+
+
+@dataclass(frozen=True, slots=True)
+class Swath:
+    """A straight line that surveys: from `start` to `end`, (x, y) metres. A cross-line is `cross`.
+
+    `run_in` is where the vehicle is on the line before `start`, `run_out` until where it stays on it after `end`.
+    """
+
+    name: str
+    start: tuple[float, float]
+    end: tuple[float, float]
+    run_in: tuple[float, float]
+    run_out: tuple[float, float]
+    cross: bool = False
+
+    @property
+    def length(self) -> float:
+        """Metres surveyed."""
+        return float(np.hypot(self.end[0] - self.start[0], self.end[1] - self.start[1]))
+
+
+@dataclass(frozen=True, slots=True)
+class Lines:
+    """One vehicle's swaths in the order in which they are driven, and the (n, 2) paths between them in metres.
+
+    `links[i]` leads from the run-out of swath i to the run-in of swath i + 1; `angle` is the lines' direction in radians.
+    `unreached` counts pieces of lines that no path leads to.
+    """
+
+    swaths: tuple[Swath, ...]
+    links: tuple[np.ndarray, ...]
+    angle: float
+    unreached: int = 0
+
+    @property
+    def tracks(self) -> list[np.ndarray]:
+        """The (2, 2) lines that survey, in order."""
+        return [np.array([s.start, s.end]) for s in self.swaths]
+
+    @property
+    def path(self) -> np.ndarray:
+        """The (n, 2) metres of all of it: run-ins, swaths, run-outs and links in order."""
+        parts: list[np.ndarray] = []
+        for i, s in enumerate(self.swaths):
+            parts.append(np.array([s.run_in, s.start, s.end, s.run_out]))
+            parts += [link[1:-1] for link in self.links[i : i + 1]]
+        return np.concatenate(parts) if parts else np.zeros((0, 2))
+
+
+def split_area(area: MultiPolygon, grid: Grid, labels: np.ndarray, vehicles: int) -> list[MultiPolygon]:
+    """Return each vehicle's part of the area in metres: what is nearest to its hypervertices, `labels` (R, C) int.
+
+    The parts make up the area; where no vehicle has a hypervertex, there is nobody's.
+    """
+    labels = np.asarray(labels)
+    if not (labels >= 0).any():
+        return [MultiPolygon() for _ in range(vehicles)]
+    rows, columns = distance_transform_edt(labels < 0, return_distances=False, return_indices=True)
+    owner = labels[rows, columns]
+    parts = []
+    for vehicle in range(vehicles):
+        change = np.diff((owner == vehicle).astype(np.int8), axis=1, prepend=0, append=0)
+        (r, first), last = np.nonzero(change == 1), np.nonzero(change == -1)[1]
+        corners = np.stack([[r, first], [r, last], [r + 1, last], [r + 1, first]]).transpose(2, 0, 1).reshape(-1, 2)
+        squares = shapely.polygons(grid.centres(2.0 * corners - 0.5).reshape(-1, 4, 2))
+        parts.append(as_multipolygon(shapely.union_all(squares, grid_size=1e-6 * grid.spacing).intersection(area)))
+    return parts
+
+
+def lay_lines(
+    area: MultiPolygon,
+    part: MultiPolygon,
+    spacing: float,
+    road: Roadmap,
+    *,
+    angle: float | None = None,
+    run: float = 0.0,
+    cross_every: int = 0,
+    turn_cost: float | None = None,
+    start: tuple[float, float] | None = None,
+) -> Lines:
+    """Cover `part` of `area` by parallel lines at most `spacing` metres apart, and link them on `road`.
+
+    `angle` is the lines' direction in radians counter-clockwise from east (None: the cheapest, with `turn_cost` metres for
+    each line, by default the spacing). Lines reach as far as the strip does that they survey, never out of `area`.
+    `run` metres are driven straight before and after each line where the road allows. `cross_every` n > 0 adds lines
+    across, n spacings apart. The route begins near `start`. Raises InputError if an option is out of range.
+    """
+    if not (np.isfinite(spacing) and spacing > 0):
+        raise InputError(f"spacing {spacing:g} must be a positive number of metres")
+    if not run >= 0 or cross_every < 0:
+        raise InputError(f"run {run:g} m and cross_every {cross_every} must not be negative")
+    turn_cost = spacing if turn_cost is None else turn_cost
+    if part.is_empty:
+        return Lines((), (), angle or 0.0)
+    if angle is None:
+        angle = _best_angle(area, part, spacing, turn_cost)
+    pieces = _pieces(area, part, spacing, angle)
+    cross = _pieces(area, part, cross_every * spacing, angle + np.pi / 2) if cross_every else np.zeros((0, 2, 2))
+    swaths = [*_swaths(pieces, road, run, "L", False), *_swaths(cross, road, run, "X", True)]
+    begin = None if start is None else np.array(start)
+    return _linked(_routed(swaths[: len(pieces)], begin) + _routed(swaths[len(pieces) :], None), road, angle)
+
+
+def _best_angle(area: MultiPolygon, part: MultiPolygon, spacing: float, turn_cost: float) -> float:
+    """Return the direction in [0, pi) with the least length of lines, `turn_cost` added for each."""
+    corners, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(part)), return_index=True)
+    step = np.diff(corners, axis=0)[ring[1:] == ring[:-1]]
+    size = np.linalg.norm(step, axis=1)
+    longest = np.argsort(-size, kind="stable")[:12]
+    along = np.arctan2(step[longest, 1], step[longest, 0]) % np.pi
+    angles = np.unique(np.round(np.concatenate([along, np.arange(0, np.pi, np.pi / 18)]), 9))
+    costs = []
+    for angle in angles:
+        lines = _pieces(area, part, spacing, float(angle))
+        costs.append(np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum() + turn_cost * len(lines))
+    return float(angles[int(np.argmin(costs))])
+
+
+def _pieces(area: MultiPolygon, part: MultiPolygon, spacing: float, angle: float) -> np.ndarray:
+    """Return the (n, 2, 2) pieces of the lines at `angle` that survey `part`, line after line."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    turn = np.array([[cos, -sin], [sin, cos]])
+    inner = area.buffer(-TOLERANCE * spacing, join_style="mitre")
+    space, wanted = (shapely.transform(g, lambda xy: xy @ turn) for g in (inner, part))
+    left, bottom, right, top = shapely.total_bounds([space, wanted])
+    _, bottom, _, top = wanted.bounds
+    count = max(1, int(np.ceil((top - bottom) / spacing - 1e-9)))
+    height = (top - bottom) / count
+    lows = bottom + height * np.arange(count)
+    strips = shapely.intersection(shapely.box(left, lows, right, lows + height), wanted)
+    shapes, strip = shapely.get_parts(strips, return_index=True)
+    bounds = shapely.bounds(shapes)
+    middles = lows[strip] + height / 2.0
+    reach = shapely.linestrings(np.stack([bounds[:, [0, 2]], np.column_stack([middles, middles])], axis=2))
+    reach = reach[bounds[:, 2] > bounds[:, 0]]
+    merged = shapely.get_parts(shapely.line_merge(shapely.union_all(reach))) if len(reach) else reach
+    inside = shapely.get_parts(shapely.intersection(merged, space))
+    inside = inside[(shapely.get_type_id(inside) == 1) & (shapely.length(inside) >= SHORTEST * spacing)]
+    ends = np.stack([shapely.get_coordinates(shapely.get_point(inside, n)) for n in (0, -1)], axis=1).reshape(-1, 2, 2)
+    ends = np.sort(ends, axis=1)  # left to right: the two differ in x alone
+    order = np.lexsort((ends[:, 0, 0], np.round(ends[:, 0, 1] / height)))
+    return ends[order] @ turn.T
+
+
+def _swaths(pieces: np.ndarray, road: Roadmap, run: float, letter: str, cross: bool) -> list[Swath]:
+    """Return named swaths of pieces of lines, with run-in and run-out as long as the road allows."""
+    if not len(pieces):
+        return []
+    direction = pieces[:, 1] - pieces[:, 0]
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    before, after = _run(pieces[:, 0], -direction, run, road), _run(pieces[:, 1], direction, run, road)
+    digits = len(str(len(pieces)))
+    return [
+        Swath(f"{letter}{n + 1:0{digits}d}", tuple(a), tuple(b), tuple(i), tuple(o), cross)
+        for n, ((a, b), i, o) in enumerate(zip(pieces.tolist(), before.tolist(), after.tolist(), strict=True))
+    ]
+
+
+def _run(points: np.ndarray, direction: np.ndarray, run: float, road: Roadmap) -> np.ndarray:
+    """Return how far from `points` one gets straight in `direction`, `run` metres at most, on the road: (n, 2) metres."""
+    if run == 0.0:
+        return points
+    rays = shapely.linestrings(np.stack([points, points + run * direction], axis=1))
+    free, ray = shapely.get_parts(shapely.intersection(rays, road.polygon), return_index=True)
+    touches = shapely.distance(free, shapely.points(points)[ray]) < 1e-6
+    reach = np.zeros(len(points))
+    np.maximum.at(reach, ray[touches], shapely.length(free[touches]))
+    return points + reach[:, None] * direction
+
+
+def _routed(swaths: list[Swath], start: np.ndarray | None) -> list[Swath]:
+    """Return the swaths in a short order with their directions: the nearest next, then improved by reversals (2-opt)."""
+    if not swaths:
+        return []
+    ends = np.array([[s.run_in, s.run_out] for s in swaths])
+    first = ends[0, 0] if start is None else start
+    order, forward = _short_order(ends, first)
+    return [swaths[i] if f else _reversed(swaths[i]) for i, f in zip(order.tolist(), forward.tolist(), strict=True)]
+
+
+def _reversed(s: Swath) -> Swath:
+    return replace(s, start=s.end, end=s.start, run_in=s.run_out, run_out=s.run_in)
+
+
+@nb.njit(cache=True)
+def _short_order(ends: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the order of lines and whether each is driven forward; `ends` (n, 2, 2) are first and last points."""
+    n = len(ends)
+    order, forward = np.empty(n, np.int64), np.empty(n, np.bool_)
+    left = np.ones(n, np.bool_)
+    x, y = start[0], start[1]
+    for k in range(n):
+        best, at, side = np.inf, -1, 0
+        for i in range(n):
+            if left[i]:
+                for e in range(2):
+                    d = np.hypot(ends[i, e, 0] - x, ends[i, e, 1] - y)
+                    if d < best - 1e-9:
+                        best, at, side = d, i, e
+        order[k], forward[k], left[at] = at, side == 0, False
+        x, y = ends[at, 1 - side, 0], ends[at, 1 - side, 1]
+    for _ in range(50):
+        improved = False
+        for i in range(n - 1):
+            for j in range(i + 1, n):
+                # reverse i .. j: the links before i and after j change, the ends of those turn round
+                a = ends[order[i], 0 if forward[i] else 1]
+                b = ends[order[j], 1 if forward[j] else 0]
+                px, py = start[0], start[1]
+                if i > 0:
+                    before = ends[order[i - 1], 1 if forward[i - 1] else 0]
+                    px, py = before[0], before[1]
+                gain = np.hypot(a[0] - px, a[1] - py) - np.hypot(b[0] - px, b[1] - py)
+                if j + 1 < n:
+                    after = ends[order[j + 1], 0 if forward[j + 1] else 1]
+                    gain += np.hypot(b[0] - after[0], b[1] - after[1]) - np.hypot(a[0] - after[0], a[1] - after[1])
+                if gain > 1e-6:
+                    order[i : j + 1] = order[i : j + 1][::-1].copy()
+                    forward[i : j + 1] = ~forward[i : j + 1][::-1].copy()
+                    improved = True
+        if not improved:
+            break
+    return order, forward
+
+
+def _linked(swaths: Iterable[Swath], road: Roadmap, angle: float) -> Lines:
+    """Return the swaths with shortest paths between them; those that no path leads to from the first are left out."""
+    kept: list[Swath] = []
+    links: list[np.ndarray] = []
+    unreached = 0
+    for swath in swaths:
+        if kept:
+            link = shortest_path(road, kept[-1].run_out, swath.run_in)
+            if link is None:
+                unreached += 1
+                continue
+            links.append(link)
+        kept.append(swath)
+    return Lines(tuple(kept), tuple(links), float(angle), unreached)
