@@ -2,17 +2,23 @@
 
 The flow between neighbouring regions solves the Laplace equation of the regions' graph (diffusive load balancing, Hu
 & Blake 1999); it is carried out by cells on the borders whose leaving keeps their region 4-connected. Where none may
-go, a cell goes with all that hangs on it; borders that stay stuck are barred for a while, so that the flow takes
-another way. The last units travel along chains of regions.
+go, a cell goes with all that hangs on it. A border that lets few cells pass conducts less from then on, so that the
+flow finds other ways. The last units travel along chains of regions.
 """
 
 import numba
 import numpy as np
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import spsolve
 
 from quarterdeck.coverage.cuts import SIMPLE, hanging, is_simple, move_hanging
 
 ROUNDS = 400
 PATIENCE = 40
+"""Rounds without progress after which the search ends."""
+
+STUCK = 10
+"""A border is stuck when less than this part of what it should let pass did."""
 
 
 def balance(labels: np.ndarray, starts: np.ndarray, targets: np.ndarray, width: int, lane: int, seed: int) -> np.ndarray:
@@ -28,30 +34,26 @@ def balance(labels: np.ndarray, starts: np.ndarray, targets: np.ndarray, width: 
     is_start[starts] = True
     labels = labels.copy()
     best, best_cost = labels.copy(), _cost(labels, targets)
-    barred = np.zeros((k, k), dtype=np.int32)
-    penalty = np.ones((k, k), dtype=np.int32)
+    ease = np.ones((k, k))  # how willingly each border lets cells pass, by what it did
     stale = 0
-    for round_ in range(ROUNDS):
+    for _ in range(ROUNDS):
         if best_cost[1] == 0 or stale > PATIENCE:
             break
         sizes, border = _census(labels, k, width)
         surplus = sizes - targets
-        if np.abs(surplus).max() > 2:
-            want = _flow(surplus, np.where(barred > round_, 0, border), targets)
+        want = _flow(surplus, np.sqrt(border) * ease, targets)
+        if want.any() and np.abs(surplus).max() > 2:
             moved = _transfer(labels, is_start, want, width, lane, SIMPLE)
             rest = want - moved
             if 4 * rest.sum() > want.sum():
                 moved += _transfer_by_depth(labels, starts, is_start, rest, width)
-            stuck = (want > 0) & (moved * 4 < want)
+            ease = np.minimum(2 * ease, 1)
+            stuck = moved * STUCK < want
+            ease[stuck | stuck.T] /= 8
             if 2 * moved.sum() < want.sum():
                 _move_blocks(labels, starts, targets, width, rng, 1.0)
-        else:
-            stuck = np.zeros((k, k), dtype=np.bool_)
-            if not _chains(labels, starts, targets, width, rng):
-                _move_blocks(labels, starts, targets, width, rng, 1.3)
-        stuck = stuck | stuck.T
-        barred[stuck] = round_ + penalty[stuck]
-        penalty[stuck] = np.minimum(penalty[stuck] * 2, 64)
+        elif not _chains(labels, starts, targets, width, rng):
+            _move_blocks(labels, starts, targets, width, rng, 1.3)
         cost = _cost(labels, targets)
         if cost < best_cost:
             best, best_cost, stale = labels.copy(), cost, 0
@@ -83,14 +85,13 @@ def _census(labels: np.ndarray, k: int, width: int) -> tuple[np.ndarray, np.ndar
     return sizes, border
 
 
-def _flow(surplus: np.ndarray, border: np.ndarray, targets: np.ndarray) -> np.ndarray:
+def _flow(surplus: np.ndarray, conductance: np.ndarray, targets: np.ndarray) -> np.ndarray:
     """Return (k, k) whole cells that each region should give to each neighbour, so that all surplus evens out.
 
-    Where barred borders part the graph, each part shares its surplus in proportion to the targets.
+    Parts of the graph without a border between them share their surplus in proportion to the targets.
     """
-    conductance = np.sqrt(border)
-    laplacian = np.diag(conductance.sum(axis=0)) - conductance
-    potential = np.linalg.solve(laplacian + 1e-7 * np.diag(np.maximum(targets, 1) / targets.mean()), surplus)
+    laplacian = np.diag(conductance.sum(axis=0) + 1e-7 * np.maximum(targets, 1) / targets.mean()) - conductance
+    potential = spsolve(csc_array(laplacian), surplus.astype(np.float64))  # numpy's solver spins up threads for this
     flow = conductance * (potential[:, None] - potential[None, :])
     return np.maximum(np.floor(flow + 0.5), 0).astype(np.int64)
 

@@ -24,7 +24,7 @@ STRETCH = 8
 LOOKS = 1000
 """How many cells the straightening of borders may look at for each cell of the area; 90 million take about a second."""
 
-LEAST_LOOKS, MOST_LOOKS = 2_500_000, 300_000_000
+LEAST_LOOKS, MOST_LOOKS = 2_000_000, 200_000_000
 """But no fewer and no more in all."""
 
 
