@@ -12,6 +12,7 @@ from quarterdeck.geo.errors import QuarterdeckError
 
 VERBS = {
     "assign": "Visit tasks with priority, time and precedence.",
+    "campaign": "Many runs of one plan, on this machine or a cluster.",
     "check": "Every problem of a site or a plan.",
     "export": "Autopilot and ECDIS files, recording, pictures.",
     "init": "A small site to start from.",

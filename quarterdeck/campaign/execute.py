@@ -1,0 +1,174 @@
+"""Running the cases of a study: over processes of this machine, or on a Dask cluster."""
+
+import os
+import threading
+import time
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from functools import lru_cache
+from multiprocessing import get_context
+from typing import Any
+
+from quarterdeck.campaign.study import Case, flat
+from quarterdeck.geo.errors import InputError, UnavailableError
+from quarterdeck.geo.version import VERSION
+from quarterdeck.mission.mission import Mission
+
+TRIES = 3  # times that a case may take its worker down before it is given up
+_ONE = threading.Lock()  # PyBullet is not made for threads; a Dask worker may have several
+
+
+def run_case(text: str, case: Case, limits: dict[str, float]) -> dict[str, Any]:
+    """Return the row of one run: the case, the verdict with its reasons, the report's figures, the trajectory's hash.
+
+    What goes wrong inside becomes the row's `error`: one bad run does not end a campaign.
+    """
+    from quarterdeck.physics.sensing import Sensing
+    from quarterdeck.physics.simulate import simulate
+
+    row = flat(case)
+    try:
+        with _ONE:
+            report = simulate(
+                _mission(text),
+                seed=case.seed,
+                current=case.current,
+                wind=case.wind,
+                gusts=case.gusts,
+                faults=case.faults,
+                sensing=Sensing(gnss=case.gnss, lidar=case.lidar, amcl=case.amcl),
+                limits=limits,
+            ).report
+    except Exception as error:
+        return row | {"passed": False, "error": f"{type(error).__name__}: {error}", "reasons": ""}
+    return row | {
+        "passed": report.passed,
+        "error": "",
+        "reasons": "; ".join(report.reasons),
+        **report.figures,
+        "trace_hash": report.trace_hash,
+    }
+
+
+@lru_cache(maxsize=2)
+def _mission(text: str) -> Mission:
+    """Return the mission in a plan's text, read once a process."""
+    import tempfile
+    from pathlib import Path
+
+    from quarterdeck.mission.planfile import read_plan
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "plan.geojson"
+        path.write_text(text, encoding="utf-8")
+        return read_plan(path)
+
+
+def over_processes(text: str, todo: list[Case], limits: dict[str, float], jobs: int) -> Iterator[dict[str, Any]]:
+    """Yield rows as runs are done, `jobs` processes at work. A process that dies takes down the runs in flight alone: they
+    are tried again, and given up after TRIES.
+    """
+    waiting, fallen = list(reversed(todo)), Counter[int]()
+    while waiting:
+        flying: dict[Future[dict[str, Any]], Case] = {}
+        with ProcessPoolExecutor(jobs, get_context("spawn"), _mind_the_parent, (os.getpid(),)) as pool:
+            try:
+                broken = False
+                while (waiting or flying) and not broken:
+                    while waiting and len(flying) < jobs and not broken:
+                        case = waiting.pop()
+                        try:
+                            flying[pool.submit(run_case, text, case, limits)] = case
+                        except BrokenProcessPool:
+                            waiting.append(case)
+                            broken = True
+                    for future in wait(flying, return_when=FIRST_COMPLETED).done if flying else ():
+                        try:
+                            row = future.result()
+                        except BrokenProcessPool:
+                            broken = True
+                            continue
+                        del flying[future]
+                        yield row
+            except (KeyboardInterrupt, GeneratorExit):
+                processes = list((pool._processes or {}).values())
+                pool.shutdown(wait=False, cancel_futures=True)
+                for process in processes:
+                    process.terminate()
+                raise
+        for case in flying.values():
+            fallen[case.number] += 1
+            if fallen[case.number] < TRIES:
+                waiting.append(case)
+            else:
+                yield _given_up(case)
+
+
+def over_cluster(text: str, todo: list[Case], limits: dict[str, float], address: str) -> Iterator[dict[str, Any]]:
+    """Yield rows as runs are done on the Dask cluster whose scheduler is at `address`; workers may come, go and die.
+
+    Raises UnavailableError where Dask is absent, InputError if nobody answers at the address.
+    """
+    try:
+        from distributed import Client, KilledWorker, as_completed
+    except ImportError:
+        raise UnavailableError("running on a cluster needs Dask: pip install 'quarterdeck[cluster]'") from None
+    try:
+        client = Client(address, timeout="10s", set_as_default=False)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise InputError(f"no Dask scheduler answers at {address} ({error}); start one with `dask scheduler`") from None
+    with client:
+        others = {v for v in client.run(_version).values() if v != VERSION}
+        if others:
+            raise InputError(
+                f"workers at {address} have quarterdeck {', '.join(sorted(others))}, here is {VERSION}; make them equal"
+            )
+        waiting = list(reversed(todo))
+
+        def submit() -> Any:
+            case = waiting.pop()
+            future = client.submit(
+                run_case, text, case, limits, pure=False, key=f"quarterdeck-{case.number}-{time.time_ns()}"
+            )
+            future.case = case
+            return future
+
+        # A few more than there are hands for, so that none waits; workers that join later are given work as it goes.
+        hands = 2 * sum(client.nthreads().values()) + 2
+        flying = as_completed([submit() for _ in range(min(len(waiting), hands))], loop=client.loop)
+        for future in flying:
+            try:
+                row = future.result()
+            except KilledWorker:
+                row = _given_up(future.case)
+            except CancelledError:
+                raise InputError(f"the Dask scheduler at {address} went away; start it and call again to go on") from None
+            yield row
+            if waiting:
+                flying.add(submit())
+
+
+def _version() -> str:
+    return VERSION
+
+
+def _given_up(case: Case) -> dict[str, Any]:
+    return flat(case) | {"passed": False, "error": f"took its worker down {TRIES} times", "reasons": ""}
+
+
+def _mind_the_parent(parent: int) -> None:
+    """End this worker when the campaign is killed: else it would wait for work for ever. Ctrl-C is the parent's to
+    handle.
+    """
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(0.5)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

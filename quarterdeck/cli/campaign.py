@@ -1,0 +1,135 @@
+"""`quarterdeck campaign`: many runs of one plan, and what they prove."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from quarterdeck.cli.output import console, force_option
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from quarterdeck.campaign.study import Case, Study
+
+
+@click.command(short_help="Many runs of one plan, on this machine or a cluster.")
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Folder for the results (default: STUDY.runs beside it)."
+)
+@click.option("--jobs", type=click.IntRange(min=1), help="Processes at work (default: as many as there are processors).")
+@click.option("--scheduler", metavar="ADDRESS", help="Run on the Dask cluster of this scheduler, such as tcp://host:8786.")
+@click.option(
+    "--worst", type=click.IntRange(min=0), default=5, show_default=True, help="How many of the worst runs to tell."
+)
+@click.option(
+    "--least", type=click.FloatRange(0, 1), help="Exit with 1 if the probability of success may be less (95 % confidence)."
+)
+@click.option("--json", "as_json", is_flag=True, help="Write the summary as JSON to standard output.")
+@force_option
+def command(
+    study: Path,
+    output: Path | None,
+    jobs: int | None,
+    scheduler: str | None,
+    worst: int,
+    least: float | None,
+    as_json: bool,
+    force: bool,
+) -> int:
+    """Run what STUDY, a TOML file, asks for (see docs/campaign.md), and tell the probability of success.
+
+    What is done is kept in the results' folder: called again after an interruption, it goes on from there. --force starts
+    anew.
+    """
+    from quarterdeck.campaign.execute import over_cluster, over_processes
+    from quarterdeck.campaign.journal import Journal
+    from quarterdeck.campaign.study import cases, read_study
+    from quarterdeck.campaign.summary import as_csv, as_parquet, summarise
+    from quarterdeck.geo.files import write_file
+
+    if scheduler and jobs:
+        raise click.UsageError("--jobs is for this machine; on a cluster its workers decide")
+    asked = read_study(study)
+    every = list(cases(asked))
+    folder = output or study.with_suffix(".runs")
+    with Journal(folder, asked.hash, force=force) as journal:
+        todo = [case for case in every if case.number not in journal.rows]
+        limits = dict(asked.limits)
+        rows = (
+            over_cluster(asked.text, todo, limits, scheduler)
+            if scheduler
+            else over_processes(asked.text, todo, limits, min(jobs or os.cpu_count() or 1, max(len(todo), 1)))
+        )
+        for row in _shown(asked, every, todo, rows):
+            journal.add(row)
+        summary = summarise(asked, every, journal.rows, worst)
+        write_file(folder / "runs.csv", as_csv(journal.rows), force=True)
+        parquet = as_parquet(journal.rows)
+        if parquet is not None:
+            write_file(folder / "runs.parquet", parquet, force=True)
+        text = json.dumps(summary, indent=2) + "\n"
+        write_file(folder / "summary.json", text, force=True)
+    if as_json:
+        click.echo(text, nl=False)
+    _print(summary, folder, parquet is not None)
+    return 1 if least is not None and summary["low"] < least else 0
+
+
+def _shown(study: Study, every: list[Case], todo: list[Case], rows: Iterator[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Pass rows on under a progress bar on standard error, where that is a terminal."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    screen = console()
+    if len(todo) < len(every):
+        screen.print(f"{len(every) - len(todo):,} of {len(every):,} runs are done already")
+    layout = [TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[failed]}")]
+    with Progress(*layout, TimeRemainingColumn(), console=screen, transient=True, disable=not screen.is_terminal) as bar:
+        task = bar.add_task(study.mission.name, total=len(every), completed=len(every) - len(todo), failed="")
+        failed = 0
+        for row in rows:
+            failed += not row["passed"]
+            bar.update(task, advance=1, failed=f"{failed} failed" if failed else "")
+            yield row
+
+
+def _print(summary: dict[str, Any], folder: Path, parquet: bool) -> None:
+    from rich.table import Table
+
+    screen = console()
+    table = Table(title=f"{summary['mission']}: {summary['runs']:,} runs", title_justify="left")
+    names = list(dict.fromkeys(n for level in summary["levels"] for n in level["levels"]))
+    for name in (*names, "runs", "passed", "probability", "95 % from", "to"):
+        table.add_column(name, justify="right")
+    for level in [*summary["levels"], summary]:
+        values = level.get("levels")
+        told = (
+            [_word(values.get(n)) for n in names]
+            if isinstance(values, dict)
+            else ["all", *[""] * (len(names) - 1)][: len(names)]
+        )
+        p = level["probability"]
+        table.add_row(
+            *told, f"{level['runs']:,}", f"{level['passed']:,}", "" if p is None else f"{p:.1%}",
+            f"{level['low']:.1%}", f"{level['high']:.1%}",
+        )  # fmt: skip
+    screen.print(table)
+    for reason, count in summary["reasons"].items():
+        screen.print(f"{count:>6,} runs: {reason}", soft_wrap=True)
+    for run in summary["worst"]:
+        if not run["passed"]:
+            screen.print(f"[bold]run {run['number']}:[/] {run['reasons']}", soft_wrap=True)
+            screen.print(f"    {run['replay']}", soft_wrap=True)
+    files = "runs.csv, runs.parquet, summary.json" if parquet else "runs.csv, summary.json"
+    screen.print(f"{folder}: {files}", soft_wrap=True)
+    if not parquet:
+        screen.print("runs.parquet needs pyarrow: pip install 'quarterdeck[campaign]'")
+
+
+def _word(value: Any) -> str:
+    return (" ".join(value) or "none") if isinstance(value, list) else "" if value is None else f"{value}"
