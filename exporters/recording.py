@@ -21,6 +21,8 @@ from quarterdeck.physics.trace import Trace
 TIMELINE = "mission_time"
 CURVES = {"speed": "speed, m/s", "energy": "energy used, Wh", "cross": "off track, m"}
 
+SAMPLES = 20_000  # of a vehicle at the most: a day at sea every few seconds, a flight of half an hour at 10 Hz
+
 
 def files(mission: Mission, settings: Settings) -> dict[str, bytes]:  # noqa: ARG001 - no autopilot reads it
     """Return `<mission>.rrd` with the plan."""
@@ -53,12 +55,13 @@ def recording(mission: Mission, trace: Trace | None = None) -> bytes:
 
 def _driven(stream: rr.RecordingStream, mission: Mission, trace: Trace, i: int, rgb: list[int]) -> None:
     name = trace.vehicles[i]
-    xyz = np.column_stack([trace.x[:, i], trace.y[:, i], trace.z[:, i]])
+    kept = slice(None, None, max(1, -(-len(trace.time) // SAMPLES)))
+    xyz = np.column_stack([trace.x[kept, i], trace.y[kept, i], trace.z[kept, i]])
     _line(stream, mission, f"driven/{name}", xyz, rgb)
-    _moving(stream, mission, f"vehicles/{name}", trace.time, xyz, rgb)
-    index = [rr.TimeColumn(TIMELINE, duration=trace.time)]
+    _moving(stream, mission, f"vehicles/{name}", trace.time[kept], xyz, rgb)
+    index = [rr.TimeColumn(TIMELINE, duration=trace.time[kept])]
     for curve in CURVES:
-        values = getattr(trace, curve)[:, i].astype(float)
+        values = getattr(trace, curve)[kept, i].astype(float)
         stream.send_columns(f"curves/{curve}/{name}", indexes=index, columns=rr.Scalars.columns(scalars=values))
         stream.log(f"curves/{curve}/{name}", rr.SeriesLines(colors=[rgb], names=[name]), static=True)
 
