@@ -80,7 +80,7 @@ PROPERTIES: dict[str, dict[str, Property]] = {
         "sensor": Property(
             {"type": "object", "required": ["kind"], "properties": {"kind": {"enum": ["swath", "camera", "sonar"]}}},
             'an object with "kind": swath, camera or sonar',
-            "what it surveys with: `swath` in metres, or the figures of the camera or sonar",
+            "what it surveys with: `swath` in metres; a `camera` by name or figures; a sonar's figures: see sensors.md",
         ),
         "range": _number("a number above 0", "metres it sees or speaks, for guards and triage", **_POSITIVE),
         "can": Property(TEXTS, "a list of texts", "its capabilities, matched with a task's `needs`"),

@@ -23,12 +23,12 @@ from quarterdeck.geo.scenario import (
     Obstacle,
     Precedence,
     Scenario,
-    Sensor,
     Site,
     Task,
     Vehicle,
     as_multipolygon,
 )
+from quarterdeck.geo.sensors import fit
 
 POINTS = ("casualty", "medic", "rendezvous")
 MAX_RADIUS = 200_000.0  # m from the frame's origin: beyond it the projection's scale is off by more than 0.05 %
@@ -248,6 +248,13 @@ def _vehicle(feature: dict[str, Any], frame: Frame, problems: list[str]) -> Vehi
             problems.append(f"{feature['place']}: end is more than {MAX_RADIUS / 1000:.0f} km from the site's centre")
             return None
         end = (float(x), float(y))
+    sensor, altitude = None, float(given.get("altitude", model.altitude))
+    if "sensor" in given:
+        try:
+            sensor, altitude = fit(given["sensor"], given.get("altitude"), model.altitude)
+        except InputError as error:
+            problems.append(f"{feature['place']}: sensor: {error}")
+            return None
     return Vehicle(
         id=feature["id"],
         model=model,
@@ -259,18 +266,11 @@ def _vehicle(feature: dict[str, Any], frame: Frame, problems: list[str]) -> Vehi
         clearance=float(given.get("clearance", model.clearance)),
         endurance=float(given.get("endurance", float("inf"))),
         battery=float(given.get("battery", model.battery)),
-        altitude=float(given.get("altitude", model.altitude)) if model.domain == "aerial" else 0.0,
-        sensor=_sensor(given["sensor"]) if "sensor" in given else None,
+        altitude=altitude if model.domain == "aerial" else 0.0,
+        sensor=sensor,
         range=given.get("range"),
         can=frozenset(given.get("can", ())),
     )
-
-
-def _sensor(given: dict[str, Any]) -> Sensor:
-    figures = {
-        k: float(v) for k, v in given.items() if isinstance(v, int | float) and not isinstance(v, bool) and k != "swath"
-    }
-    return Sensor(given["kind"], given.get("swath"), figures)
 
 
 def _task(feature: dict[str, Any], frame: Frame) -> Task:
