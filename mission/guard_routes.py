@@ -96,6 +96,7 @@ def shorter_tours(
     *,
     ranks: np.ndarray | None = None,
     exchange: bool = True,
+    effort: float = 1.0,
     seed: int = 0,
 ) -> Tours:
     """Return tours past the same guards along shortest paths, of a makespan not above that of `tours`.
@@ -105,7 +106,7 @@ def shorter_tours(
     """
     ways = _ways(space, tours.guards, team)
     if exchange:
-        orders = improve_tours(ways.lengths, tours.order, team.speeds, ranks=ranks, seed=seed)
+        orders = improve_tours(ways.lengths, tours.order, team.speeds, ranks=ranks, effort=effort, seed=seed)
     else:
         orders = [_alone(ways.lengths, tours, team, robot, ranks, seed) for robot in range(len(team.vehicles))]
     return _driven(ways, tours, orders, team)
@@ -172,6 +173,7 @@ def guard_layers(tours: Tours, team: Team) -> tuple[Layer, ...]:
             "range": float(team.ranges[owner] if owner >= 0 else team.ranges.min()),
             "vehicle": names[owner] if owner >= 0 else None,
             "turn": turns.get(guard),
+            "seen": False,
         }
         for guard, owner in enumerate(tours.owners.tolist())
     ]

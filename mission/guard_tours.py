@@ -16,13 +16,14 @@ def improve_tours(
     speeds: np.ndarray,
     *,
     ranks: np.ndarray | None = None,
+    effort: float = 1.0,
     seed: int = 0,
 ) -> list[list[int]]:
     """Return tours of a makespan not above that of `tours`, found from them by simulated annealing.
 
     `lengths` (m + 2 k, m + 2 k) metres between the m guards, the k robots' starts, then their ends; every guard is on one
     of the k tours; `speeds` (k,) m/s. With `ranks` (m,), no robot visits a guard before one of a higher rank, and higher
-    ranks are done as soon as can be, whatever that costs the makespan.
+    ranks are done as soon as can be, whatever that costs the makespan. `effort` scales the number of steps.
     """
     k = len(tours)
     m = len(lengths) - 2 * k
@@ -39,7 +40,7 @@ def improve_tours(
         if level != levels[-1]:  # not home yet: what counts is when the last of this rank is seen
             part[:, -k:] = part[-k:, :] = 0.0
         begin = [[number[g] for g in tour if rank[g] == level] for tour in tours]
-        for robot, order in enumerate(_improved(part, begin, np.asarray(speeds, dtype=float), spent, seed)):
+        for robot, order in enumerate(_improved(part, begin, np.asarray(speeds, dtype=float), spent, effort, seed)):
             walk = [places[robot], *mine[order]]
             spent[robot] += lengths[walk[:-1], walk[1:]].sum() / speeds[robot]
             orders[robot] += mine[order].tolist()
@@ -48,7 +49,7 @@ def improve_tours(
 
 
 def _improved(
-    lengths: np.ndarray, tours: Sequence[Sequence[int]], speeds: np.ndarray, spent: np.ndarray, seed: int
+    lengths: np.ndarray, tours: Sequence[Sequence[int]], speeds: np.ndarray, spent: np.ndarray, effort: float, seed: int
 ) -> list[list[int]]:
     """Return shorter tours of one rank, for robots that have spent (k,) seconds already."""
     k, m = len(tours), len(lengths) - 2 * len(tours)
@@ -59,7 +60,7 @@ def _improved(
         rows[robot, : len(tour)] = tour
     away = lengths[:m, :m] + np.diag(np.full(m, np.inf))
     near = np.argsort(away, axis=1, kind="stable")[:, : min(12, m - 1)]
-    best, best_sizes = _anneal(lengths, rows, sizes, speeds, spent, near, STEPS + STEPS_A_GUARD * m, seed)
+    best, best_sizes = _anneal(lengths, rows, sizes, speeds, spent, near, int(effort * (STEPS + STEPS_A_GUARD * m)), seed)
     return [best[robot, : best_sizes[robot]].tolist() for robot in range(k)]
 
 

@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 import shapely
+from shapely import MultiPolygon
 
 from quarterdeck.coverage.guards.bound import guards_bound
 from quarterdeck.coverage.guards.certificate import TOLERANCE, mend, uncovered
@@ -42,7 +43,8 @@ def plan_guards(
     makes the mission infeasible.
     """
     ranges = vehicle_ranges(scenario.vehicles, range)
-    space, team = enter(space_of(scenario), scenario.vehicles, ranges)
+    space, team, lonely = enter(space_of(scenario), scenario.vehicles, ranges)
+    _refuse_lonely(space, lonely)
     if inspect == "border":
         space = replace(space, target=border_of(space.target))
     reach = float(ranges.min())
@@ -155,10 +157,9 @@ def vehicle_ranges(vehicles: Sequence[Vehicle], default: float | None) -> np.nda
     return np.array(ranges, dtype=float)
 
 
-def enter(space: Space, vehicles: tuple[Vehicle, ...], ranges: np.ndarray) -> tuple[Space, Team]:
-    """Return the space with only the parts that a robot starts in, and the robots with where they enter and leave it.
-
-    Raises InputError if one starts outside or cannot come home, or a part of the target is in a part without any.
+def enter(space: Space, vehicles: tuple[Vehicle, ...], ranges: np.ndarray) -> tuple[Space, Team, MultiPolygon]:
+    """Return the space with only the parts that a robot starts in, the robots with where they enter and leave it, and
+    what of the target is in the other parts. Raises InputError if a robot starts outside or cannot come home.
     """
     parts = shapely.get_parts(space.reach)
     starts = [_enter(space, parts, v, v.start, "starts") for v in vehicles]
@@ -167,17 +168,20 @@ def enter(space: Space, vehicles: tuple[Vehicle, ...], ranges: np.ndarray) -> tu
         if start != home:
             raise InputError(f"vehicle {vehicle.id!r} cannot get from its start to its end; move one of them")
     used = sorted({part for part, _ in starts})
-    apart = shapely.union_all(np.delete(parts, used))
-    lonely = as_multipolygon(shapely.intersection(space.target, apart))
-    if lonely.area > TOLERANCE * space.target.area:
-        point = shapely.get_coordinates(shapely.point_on_surface(lonely))
-        place = "" if space.frame is None else ", such as {:.6f}, {:.6f}".format(*space.frame.to_degrees(point)[0])
-        raise InputError(
-            f"{lonely.area:.6g} m2 of the area can be reached by no vehicle{place}; start one there, or leave that part out"
-        )
-    reach = as_multipolygon(shapely.multipolygons(parts[used]))
+    lonely = as_multipolygon(shapely.intersection(space.target, shapely.union_all(np.delete(parts, used))))
     entries, exits = (np.array([xy for _, xy in ends]) for ends in (starts, homes))
-    return replace(space, reach=reach), Team(vehicles, entries, exits, ranges)
+    reach = as_multipolygon(shapely.multipolygons(parts[used]))
+    return replace(space, reach=reach), Team(vehicles, entries, exits, ranges), lonely
+
+
+def _refuse_lonely(space: Space, lonely: MultiPolygon) -> None:
+    if lonely.area <= TOLERANCE * space.target.area:
+        return
+    point = shapely.get_coordinates(shapely.point_on_surface(lonely))
+    place = "" if space.frame is None else ", such as {:.6f}, {:.6f}".format(*space.frame.to_degrees(point)[0])
+    raise InputError(
+        f"{lonely.area:.6g} m2 of the area can be reached by no vehicle{place}; start one there, or leave that part out"
+    )
 
 
 def _enter(

@@ -1,0 +1,161 @@
+"""A guards mission from now on: what is left to see, shared out among whoever works, from where they are."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import shapely
+
+from quarterdeck.coverage.forest import ABSENT, NEVER, ROOT, Forest, in_order
+from quarterdeck.coverage.guards.certificate import TOLERANCE, mend
+from quarterdeck.coverage.guards.fewer import needless
+from quarterdeck.coverage.guards.space import Space, border_of, space_of
+from quarterdeck.coverage.network import Network, network
+from quarterdeck.coverage.recovery import recover
+from quarterdeck.geo.scenario import Scenario, as_multipolygon
+from quarterdeck.geo.triangulation import Triangulation, triangulate
+from quarterdeck.geo.visibility import visibility_polygons
+from quarterdeck.mission.guard_routes import Team, Tours, guard_route, shorter_tours
+from quarterdeck.mission.guards import enter, guards_mission, vehicle_ranges
+from quarterdeck.mission.mission import Layer, Mission
+from quarterdeck.mission.timing import shortfalls
+
+EFFORT = 0.1  # of the search for a whole plan: robots are waiting
+
+
+def guards_from_now(mission: Mission, scenario: Scenario, served: frozenset[str], *, seed: int = 0) -> Mission:
+    """Return the mission that sees what `mission`, a guards plan, has not confirmed to have seen.
+
+    `scenario` is the world as it is now: the site, and the vehicles that work, each with its start where it is, its end
+    where it is to come home, and the energy that it has left. Vehicles of `mission` that are not in it are lost, new ones
+    have joined. `served` are the stops (`guard-0`, ...) whose observation is confirmed. Guards of lost vehicles go to
+    supportive ones (`coverage.recovery.recover`), then all orders are searched anew. Where the site has changed, guards
+    are added. What cannot be seen any more, for want of a way or of energy, is told as an area, and makes it infeasible.
+    """
+    ranges = vehicle_ranges(scenario.vehicles, mission.parameters.get("range"))
+    whole, team, lonely = enter(space_of(scenario), scenario.vehicles, ranges)
+    if mission.parameters.get("inspect") == "border":
+        whole = replace(whole, target=border_of(whole.target))
+    mesh = triangulate(whole.sight)
+    target = _unseen(mission, whole, mesh, served)
+    if target.area <= TOLERANCE * whole.target.area:
+        target = shapely.MultiPolygon()
+    space = replace(whole, target=target)
+    guards, owners = _left(mission, space, mesh, team, served)
+    guards, hidden = mend(space, mesh, guards, float(ranges.min()))
+    owners += [None] * (len(guards) - len(owners))
+    net = network(space.reach, guards, team.starts)
+    start = Tours(guards, net, _shared(net, owners, mission, team), (), (), np.zeros(len(ranges)), 0.0)
+    tours = _affordable(space, shorter_tours(space, start, team, effort=EFFORT, seed=seed), team)
+    after = guards_mission(scenario, space, mesh, tours, team, ())
+    lost = after.figures["certificate"]["uncovered"]
+    reasons = [f"{lost:.6g} m2 can no longer be seen" + _why(hidden.area, lonely.area, lost)] if lost > 0 else []
+    return replace(
+        after,
+        parameters=mission.parameters,
+        seed=seed,
+        layers=(_with_seen(after.layers[0], mission, served), *after.layers[1:]),
+        reasons=(*reasons, *after.reasons),
+    )
+
+
+def _confirmed(mission: Mission, served: frozenset[str]) -> list[tuple[shapely.Point, float]]:
+    """Return place and range of each guard whose observation is confirmed, now or before the mission was made."""
+    layer = next(layer for layer in mission.layers if layer.name == "guards")
+    pairs = zip(layer.geometries, layer.properties, strict=True)
+    return [(place, float(p["range"])) for place, p in pairs if _done(p, served)]
+
+
+def _done(guard: Mapping[str, Any], served: frozenset[str]) -> bool:
+    return bool(guard["seen"]) or f"guard-{guard['guard']}" in served
+
+
+def _with_seen(layer: Layer, mission: Mission, served: frozenset[str]) -> Layer:
+    """Return the guards' layer with those that are done, for whoever replans next."""
+    done = _confirmed(mission, served)
+    first = len(layer.geometries)
+    told = [
+        {"guard": first + i, "range": reach, "vehicle": None, "turn": None, "seen": True}
+        for i, (_, reach) in enumerate(done)
+    ]
+    return replace(layer, geometries=(*layer.geometries, *(p for p, _ in done)), properties=(*layer.properties, *told))
+
+
+def _unseen(mission: Mission, space: Space, mesh: Triangulation, served: frozenset[str]) -> shapely.MultiPolygon:
+    """Return the target less what confirmed observations have seen."""
+    done = _confirmed(mission, served)
+    if not done:
+        return space.target
+    views = visibility_polygons(mesh, shapely.get_coordinates([p for p, _ in done]), np.array([r for _, r in done]))
+    return as_multipolygon(space.target.difference(shapely.union_all(views)))
+
+
+def _left(
+    mission: Mission, space: Space, mesh: Triangulation, team: Team, served: frozenset[str]
+) -> tuple[np.ndarray, list[str | None]]:
+    """Return the guards that are still needed, and the vehicle that was to pass each; in the order of the plan's tours."""
+    layer = next(layer for layer in mission.layers if layer.name == "guards")
+    places = shapely.get_coordinates(layer.geometries)
+    inside = shapely.contains_xy(space.reach, places[:, 0], places[:, 1])
+    turns = [(p["turn"] is None, p["turn"] or 0, p["guard"]) for p in layer.properties]
+    order = [i for _, _, i in sorted(turns) if inside[i] and not _done(layer.properties[i], served)]
+    views = visibility_polygons(mesh, places[order], float(team.ranges.min()))
+    kept = [i for i, drop in zip(order, needless(space.target, views), strict=True) if not drop] if order else []
+    return places[kept].reshape(-1, 2), [layer.properties[i]["vehicle"] for i in kept]
+
+
+def _shared(net: Network, owners: list[str | None], mission: Mission, team: Team) -> tuple[tuple[int, ...], ...]:
+    """Return per working robot its guards: those it had, and those that it takes over from lost ones."""
+    names = [v.id for v in team.vehicles]
+    k, lost_names = len(names), [v.id for v in mission.vehicles if v.id not in {w.id for w in team.vehicles}]
+    number = {name: robot for robot, name in enumerate([*names, *lost_names])}
+    n = len(net.cdt.points)
+    parents = np.full((len(number), n), ABSENT, dtype=np.int64)
+    ticks = np.full((len(number), n), NEVER, dtype=np.int64)
+    parents[np.arange(k), net.entries] = ROOT
+    for tick, (vertex, owner) in enumerate(zip(net.guards, owners, strict=True)):
+        if owner is not None:
+            parents[number[owner], vertex] = ROOT  # whatever the search has given it, connected or not, is its tree
+            ticks[number[owner], vertex] = tick
+    lost = np.arange(len(number)) >= k
+    forest = Forest(parents, in_order(ticks), ticks)
+    after = recover(net.reduced, net.guards, forest, seen=np.zeros(n, dtype=np.bool_), lost=lost).forest
+    guard_of = {int(v): i for i, v in enumerate(net.guards)}
+    mine = after.owners
+    return tuple(tuple(guard_of[int(v)] for v in after.chosen[robot] if mine[v] == robot) for robot in range(k))
+
+
+def _affordable(space: Space, tours: Tours, team: Team) -> Tours:
+    """Take the last guards from robots that cannot pay for them, and give them to others that can."""
+    orders = [list(order) for order in tours.order]
+
+    def driven() -> Tours:
+        given = replace(tours, order=tuple(map(tuple, orders)))
+        return shorter_tours(space, given, team, exchange=False, effort=0.0)
+
+    def pays(robot: int) -> bool:
+        return not shortfalls(team.vehicles[robot], guard_route(team.vehicles[robot], tours, robot))
+
+    dropped: list[int] = []
+    poor = [robot for robot in range(len(orders)) if not pays(robot)]
+    while poor:
+        dropped += [orders[robot].pop() for robot in poor if orders[robot]]
+        tours = driven()
+        poor = [robot for robot in poor if orders[robot] and not pays(robot)]
+    for guard in dropped:
+        for robot in np.argsort(tours.times, kind="stable").tolist():
+            before = tours
+            orders[robot].append(guard)
+            tours = driven()
+            if pays(robot):
+                break
+            orders[robot].pop()
+            tours = before
+    return tours
+
+
+def _why(hidden: float, lonely: float, lost: float) -> str:
+    if lonely > 0.5 * lost:
+        return ": no working vehicle can get there"
+    return ": it is hidden from where the vehicles may be" if hidden > 0.5 * lost else ": the energy left does not suffice"
