@@ -11,6 +11,7 @@ from quarterdeck import __version__
 from quarterdeck.geo.errors import QuarterdeckError
 
 VERBS = {
+    "chart": "ENC cells as a site.",
     "assign": "Visit tasks with priority, time and precedence.",
     "campaign": "Many runs of one plan, on this machine or a cluster.",
     "check": "Every problem of a site or a plan.",
