@@ -11,9 +11,11 @@ import numba
 import numpy as np
 import shapely
 from shapely import MultiPolygon
+from shapely.ops import nearest_points
 
 from quarterdeck.mission.triage.records import XY, Belief
 
+LEGS = 1.4  # ranges between the legs of a square search: at its corners the diagonal counts
 Ways = Callable[[XY, XY], Sequence[XY]]  # the corners of a shortest path, its end included, its start not
 
 
@@ -60,10 +62,11 @@ def chase(knots: np.ndarray, here: XY, speed: float, now: float, ways: Ways) -> 
 def expanding_square(centre: XY, area: MultiPolygon, spacing: float, ways: Ways) -> list[XY]:
     """Return the corners of the search for somebody last known at `centre`: a square spiral over all of `area`, in metres.
 
-    Its legs are `spacing` apart (IAMSAR Manual, vol. III: expanding square search); what lies outside the area is left out.
+    Its legs are `spacing` apart (IAMSAR Manual, vol. III: expanding square search). Legs outside the area are left out, but
+    for those within `spacing` of it: they run along its border, or a strip inside it would be missed.
     """
     x0, y0, x1, y1 = area.bounds
-    far = max(abs(x0 - centre[0]), abs(x1 - centre[0]), abs(y0 - centre[1]), abs(y1 - centre[1]))
+    far = max(abs(x0 - centre[0]), abs(x1 - centre[0]), abs(y0 - centre[1]), abs(y1 - centre[1])) + spacing
     turns = [centre]
     for leg in range(4 * int(far / spacing + 1.5)):
         dx, dy = ((1, 0), (0, 1), (-1, 0), (0, -1))[leg % 4]
@@ -71,10 +74,11 @@ def expanding_square(centre: XY, area: MultiPolygon, spacing: float, ways: Ways)
         turns.append((turns[-1][0] + dx * length, turns[-1][1] + dy * length))
     legs = shapely.linestrings(list(pairwise(turns)))
     corners = [centre]
-    for leg in shapely.intersection(legs, area):
+    for leg in shapely.intersection(legs, area.buffer(spacing, join_style="mitre")):
         for piece in shapely.get_parts(leg):
-            for x, y in shapely.get_coordinates(piece).tolist():
-                corners += [c for c in ways(corners[-1], (x, y)) if c != corners[-1]]
+            for place in shapely.points(shapely.get_coordinates(piece)):
+                near = nearest_points(area, place)[0]
+                corners += [c for c in ways(corners[-1], (near.x, near.y)) if c != corners[-1]]
     return corners[1:] or [centre]
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from quarterdeck.mission.director import Command, State
 from quarterdeck.mission.mission import Waypoint
-from quarterdeck.mission.triage.chase import Ways, expanding_square
+from quarterdeck.mission.triage.chase import LEGS, Ways, expanding_square
 from quarterdeck.mission.triage.machines import Row, step
 from quarterdeck.mission.triage.records import XY, Entry, Medic, Memory, Record, Uav, Ugv
 from quarterdeck.mission.triage.settings import Policy, Settings
@@ -49,9 +49,11 @@ class Desk:
         """Let a member's machine make the step of an event; its action is for the caller to do."""
         record: Record = self.agents[name]
         row = step(_KIND[type(record)], record.state, event)
-        if row is not None and row.next != record.state:
-            self.change(name, state=row.next)
-            self.note(name, "state", row.next, whom=event)
+        if row is not None:
+            if row.next != record.state:
+                self.change(name, state=row.next)
+            if event != "casualty seen":  # that is logged as found
+                self.note(name, "state", row.next, whom=event)
         return row
 
     def note(self, name: str, what: str, about: str = "", whom: str = "") -> None:
@@ -88,7 +90,7 @@ class Desk:
         """Command a member to search all the field for a medic, from where it is outwards."""
         here = self.here(name)
         area = self.team.air if isinstance(self.agents[name], Uav) else self.team.ground
-        self.drive(name, expanding_square(here, area, 1.8 * self.settings.talk, self.ways(name)), speed)
+        self.drive(name, expanding_square(here, area, LEGS * self.settings.talk, self.ways(name)), speed)
 
     def lose(self, name: str, kind: str) -> None:
         """A member stops for ever or, if it is a medic whose device fails, hears and tells nothing any more."""

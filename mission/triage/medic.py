@@ -6,7 +6,7 @@ from shapely import box
 from quarterdeck.geo.scenario import as_multipolygon
 from quarterdeck.mission.mission import Waypoint
 from quarterdeck.mission.priority_tsp import priority_order
-from quarterdeck.mission.triage.chase import expanding_square
+from quarterdeck.mission.triage.chase import LEGS, expanding_square
 from quarterdeck.mission.triage.desk import Desk
 from quarterdeck.mission.triage.records import Belief, Medic, Report
 from quarterdeck.mission.triage.settings import RANK
@@ -61,7 +61,7 @@ def arrived(desk: Desk, name: str) -> None:
         if me.looked < _LOOKS:
             desk.fire(name, "arrived, nobody there")
             desk.change(name, looked=me.looked + 1)
-            _look_around(desk, name, 4.0 ** (me.looked + 1))
+            _look_around(desk, name, report, 4.0 ** (me.looked + 1))
         else:
             desk.fire(name, "looked around in vain")
             desk.note(name, "not there", report.id)
@@ -80,13 +80,14 @@ def arrived(desk: Desk, name: str) -> None:
     desk.send(name, [Waypoint(x, y, hold=seconds, task=report.id)])
 
 
-def _look_around(desk: Desk, name: str, sigmas: float) -> None:
+def _look_around(desk: Desk, name: str, report: Report, sigmas: float) -> None:
     """Search outwards from where the casualty was told to be."""
     side = 2.0 * max(sigmas * desk.settings.position_error, desk.settings.medic_sees)
-    x, y = desk.here(name)
+    x, y = report.x, report.y
     around = as_multipolygon(desk.team.foot.intersection(box(x - side / 2, y - side / 2, x + side / 2, y + side / 2)))
-    spacing = 1.8 * max(desk.settings.medic_sees, 0.1)
-    corners = expanding_square((x, y), around, spacing, desk.team.on_foot)
+    spacing = LEGS * max(desk.settings.medic_sees, 0.1)
+    ways = desk.team.on_foot
+    corners = [*ways(desk.here(name), (x, y)), *expanding_square((x, y), around, spacing, ways)]
     desk.drive(name, corners, _speed(desk, desk.agents[name]))
 
 
@@ -121,7 +122,7 @@ def _speed(desk: Desk, me: Medic) -> float:
 
 def _strike_off(desk: Desk, name: str, casualty: str) -> None:
     me: Medic = desk.agents[name]
-    desk.change(name, queue=tuple(r for r in me.queue if r.id != casualty), heading_for="", looked=0)
+    desk.change(name, queue=tuple(r for r in me.queue if r.id != casualty), heading_for="")
     _plan(desk, name)
 
 
@@ -144,7 +145,7 @@ def _plan(desk: Desk, name: str) -> None:
         return
     here = desk.here(name)
     walked = me.walked + ((here[0] - me.last[0]) ** 2 + (here[1] - me.last[1]) ** 2) ** 0.5
-    desk.change(name, heading_for=queue[0].id, walked=walked, last=here)
+    desk.change(name, heading_for=queue[0].id, walked=walked, last=here, looked=0)
     corners = desk.team.on_foot(here, (queue[0].x, queue[0].y))
     desk.drive(name, corners, _speed(desk, desk.agents[name]))
 

@@ -10,6 +10,7 @@ from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Scenario
 from quarterdeck.mission.triage.director import triage
 from quarterdeck.mission.triage.records import Entry, Memory
+from quarterdeck.mission.triage.search import Search
 from quarterdeck.mission.triage.settings import METHODS, Settings
 from quarterdeck.mission.triage.team import Team, make_team, targets
 from quarterdeck.mission.world import Fault, Run, run_world
@@ -78,14 +79,15 @@ def run_triage(
     *,
     seed: int = 0,
     faults: Sequence[Fault] = (),
+    search: Search | None = None,
 ) -> Outcome:
     """Run a method on a scenario in the fast world and return what became of every casualty.
 
-    `seed` decides only what robots sort wrongly, where their `confidence` is below 1. Raises InputError as `make_team`
-    does, or if a fault names nobody of the team.
+    `seed` decides only what robots sort and measure wrongly, where the settings say that they do; `search` gives the UGVs
+    other paths than their tours. Raises InputError as `make_team` does, or if a fault names nobody of the team.
     """
     settings = settings or Settings()
-    team = make_team(scenario, method, settings)
+    team = make_team(scenario, method, settings, search)
     names = [*team.ugvs, *team.uavs, *team.medics]
     for fault in faults:
         known = {*names, *(v.id for v in scenario.vehicles)}

@@ -64,8 +64,8 @@ class Team:
         ]
 
 
-def make_team(scenario: Scenario, method: str, settings: Settings) -> Team:
-    """Return the team of a scenario for a method.
+def make_team(scenario: Scenario, method: str, settings: Settings, search: Search | None = None) -> Team:
+    """Return the team of a scenario for a method; `search` gives the UGVs other paths than their tours.
 
     Raises InputError, in one line, if there is no UGV or medic, no UAV for a method that needs one, or a casualty, medic or
     rendezvous is where nobody can get.
@@ -92,7 +92,8 @@ def make_team(scenario: Scenario, method: str, settings: Settings) -> Team:
     sees = [u.range or settings.ugv_sees for u in ugvs]
     field = as_multipolygon(scenario.site.area.intersection(scenario.site.navigable("ground")))
     starts = tuple((float(u.start[0]), float(u.start[1])) for u in ugvs)
-    search = search_paths(field, ground, starts, spacing, min(sees), on_ground)
+    if search is None:
+        search = search_paths(field, ground, starts, spacing, min(sees), on_ground)
     points = _rendezvous(scenario, search) if policy.receiver == "uav" else ()
     routes = [tuple(Waypoint(float(x), float(y), leg="survey", speed=u.speed) for x, y in p)
               for u, p in zip(ugvs, search.paths, strict=True)]  # fmt: skip

@@ -6,6 +6,7 @@ from quarterdeck.cli import LazyGroup
 
 PAPERS: dict[str, str] = {
     "ecdis": "Coverage by several USVs beside an ECDIS.",
+    "triage": "Table I and Figs 6 to 9 of the triage paper.",
 }
 
 
