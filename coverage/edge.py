@@ -15,7 +15,7 @@ import shapely
 from shapely import LineString, MultiPolygon, STRtree
 
 from quarterdeck.coverage.metrics import count_turns, track_length, uncovered
-from quarterdeck.coverage.strips import grow
+from quarterdeck.coverage.strips import grow, polished
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.grid import TOLERANCE, Grid
 
@@ -25,6 +25,9 @@ CHEAP = 0.2  # `cells` runs on where it covers this many cells' area per cell of
 DEAR = 0.03  # `lap` goes on down to this
 ALLOWANCE = 0.198  # `lap` may drive this much more per square metre covered than `whole`: 0.2, less what sampling errs
 RING_PAYS = 0.15  # a lap is considered when it covers this many cells' area per cell of length
+ENOUGH = 0.995  # of the area: where that is covered, tracks stay on the lattice, with spurs, bulges and laps
+PRICES = (0.5, 0.3, 0.2)  # the area that a length is worth when tracks are polished, from coarse to fine
+BEND = 0.05  # the length that one turn less is worth then
 ONE_VEHICLE = 0.9  # and when this much of it is nearest to one vehicle's tracks
 
 
@@ -76,17 +79,29 @@ def _trimmed(path: np.ndarray) -> np.ndarray:
 
 
 def _lap(paths: list[np.ndarray], space: MultiPolygon, wanted: MultiPolygon, turn_cost: float) -> list[np.ndarray]:
-    """Return the paths with laps and growth, or growth alone, whichever costs less for what it covers."""
+    """Return the paths with laps and growth, or growth alone, whichever costs less for what it covers.
+
+    Where neither covers `ENOUGH`, as on small and narrow areas, vertices are moved too.
+    """
     whole = sum(track_length(np.vstack([p, p[:1]])) for p in paths)
     limit = (1 + ALLOWANCE) * whole / _covered(paths, wanted)
-    ringed = _with_rings(paths, space, wanted, limit)
+    starts = [p for p in (paths, _with_rings(paths, space, wanted, limit)) if p is not None]
     plans = [
-        _Plan.of(grow(start, space, wanted, least=DEAR, turn_cost=0.0, most_per_area=limit), wanted, turn_cost)
-        for start in (paths, ringed)
-        if start is not None
+        _Plan.of(grow(p, space, wanted, least=DEAR, turn_cost=0.0, most_per_area=limit), wanted, turn_cost) for p in starts
     ]
+    if max(p.covered for p in plans) < ENOUGH * wanted.area:
+        plans += [_Plan.of(q, wanted, turn_cost) for p in plans for q in _smoothed(p.paths, space, wanted, limit)]
     most = max(p.covered for p in plans)
     return min((p for p in plans if p.covered >= most - 0.002 * wanted.area), key=lambda p: p.cost).paths
+
+
+def _smoothed(paths: list[np.ndarray], space: MultiPolygon, wanted: MultiPolygon, limit: float) -> list[list[np.ndarray]]:
+    """Return what polishing and growing in turn make of the paths, within the limit; they bend more than others."""
+    stages = [paths]
+    for price in PRICES:
+        smooth = polished(stages[-1], space, wanted, price=price, turn_cost=BEND)
+        stages.append(grow(smooth, space, wanted, least=DEAR, turn_cost=0.0, most_per_area=limit))
+    return [p for p in stages[1:] if sum(track_length(np.vstack([q, q[:1]])) for q in p) <= limit * _covered(p, wanted)]
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,7 +42,7 @@ def _star(rng, x, y, radius):
     return Polygon(np.column_stack([x + reach * np.cos(angle), y + reach * np.sin(angle)])).buffer(0)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(deadline=None, max_examples=12)
 @given(plans(), st.sampled_from(["whole", "cells", "lap"]))
 def test_tracks_are_closed_inside_and_begin_where_the_tour_does(plan, edge):
     """Whatever the edge, each track is closed, begins at its tour's first cell, and shapely finds it inside the area."""
@@ -55,7 +55,7 @@ def test_tracks_are_closed_inside_and_begin_where_the_tour_does(plan, edge):
         assert shapely.covers(area, shapely.linestrings(track))
 
 
-@settings(deadline=None, max_examples=15)
+@settings(deadline=None, max_examples=8)
 @given(plans())
 def test_more_edge_covers_more_and_the_lap_keeps_its_budget(plan):
     """Cells and lap cover at least what whole does; a lap costs at most 21 % more per square metre covered."""
@@ -138,3 +138,15 @@ def test_unknown_edge_is_refused():
     grid = place(area, 10.0, method="none").grid
     with pytest.raises(InputError, match="whole, cells, lap"):
         lay_tracks(area, grid, [], edge="fringe")
+
+
+def test_narrow_area_is_nearly_all_covered_by_the_lap():
+    """Where whole cells cover four fifths of a small crooked area, the lap covers 98.5 % within its budget of length."""
+    outline = [(0, 0), (100, -90), (290, 20), (320, 160), (200, 150), (170, 60), (60, 110)]
+    area = as_multipolygon(Polygon(outline))
+    grid = place(area, 25.0).grid
+    walk = tours(np.where(grid.hypervertices, 0, -1), np.argwhere(grid.hypervertices)[:1])
+    whole, lap = (measure(lay_tracks(area, grid, walk, edge=e), area, grid) for e in ("whole", "lap"))
+    assert whole.poc < 0.9
+    assert lap.poc > 0.985
+    assert lap.length / lap.poc <= 1.2 * whole.length / whole.poc
