@@ -56,8 +56,9 @@ class Site:
         """Return where a vehicle's reference point may be: the operating area minus what blocks it, less `clearance`."""
         blocking = unary_union([o.polygon for o in self.obstacles if domain in o.blocks])
         if clearance > 0:
-            # An arc of 4 segments a quarter lies inside the true one; widened by its sagitta it never cuts the clearance.
-            blocking = blocking.buffer(clearance / math.cos(math.pi / 16), quad_segs=4)
+            # GEOS rounds the number of chords of an arc, so that one may span up to 1.5 of the 22.5 degrees asked for;
+            # widened by its sagitta it never cuts the clearance.
+            blocking = blocking.buffer(clearance / math.cos(1.5 * math.pi / 16), quad_segs=4)
         return as_multipolygon(self.operating.difference(blocking))
 
 

@@ -20,13 +20,13 @@ REVERSAL = math.radians(150.0)  # a sharper bend is driven past, and come back t
 @dataclass(frozen=True, slots=True)
 class Driven:
     """A path with its turns: (n, 2) metres, the kind of each leg, its speed as a part of the vehicle's (a tighter curve is
-    driven slower), and the corners (2,) for which no curve has room: they stay as they are.
+    driven slower), and `stops` (n,) bool, the corners for which no curve has room: there it turns on the spot.
     """
 
     points: np.ndarray
     legs: list[Leg]
     pace: np.ndarray
-    stuck: list[np.ndarray]
+    stops: np.ndarray
 
 
 def with_turns(points: np.ndarray, legs: Sequence[Leg], radius: float, space: MultiPolygon) -> Driven:
@@ -38,18 +38,19 @@ def with_turns(points: np.ndarray, legs: Sequence[Leg], radius: float, space: Mu
     """
     points = np.asarray(points, dtype=float)
     if radius <= 0 or len(points) < 3:
-        return Driven(points, list(legs), np.ones(len(points)), [])
+        return Driven(points, list(legs), np.ones(len(points)), np.zeros(len(points), dtype=bool))
     heading, bend, length = _bends(points)
     reversal = np.abs(bend) > REVERSAL
     tangent = np.where(reversal, 0.0, radius * np.tan(np.abs(bend) / 2))
     crowded = tangent[:-1] + tangent[1:] > length + 1e-9
     shapely.prepare(space)
-    out, kinds, pace, stuck = [points[0]], [legs[0]], [1.0], []
+    out, kinds, pace, stops = [points[0]], [legs[0]], [1.0], [False]
     i = 1
     while i < len(points):
         out.append(points[i])
         kinds.append(legs[i])
         pace.append(1.0)
+        stops.append(False)
         last = i == len(points) - 1
         if last or not (reversal[i] or crowded[i - 1] or crowded[i]) or abs(bend[i]) < 1e-6:
             i += 1
@@ -57,15 +58,16 @@ def with_turns(points: np.ndarray, legs: Sequence[Leg], radius: float, space: Mu
         j = i + 1 if crowded[i] and not reversal[i] and i + 2 < len(points) and abs(bend[i + 1]) > 1e-6 else i
         part, curve = _curve(points, heading, length, i, j, radius, space)
         if curve is None:
-            stuck.append(points[i])
+            stops[-1] = True
             i += 1
             continue
         out[-1] = curve[0]
         out += list(curve[1:])
         kinds.extend(["turn"] * (len(curve) - 1))
         pace += [part] * (len(curve) - 1)
+        stops += [False] * (len(curve) - 1)
         i = j + 1
-    return Driven(np.array(out), kinds, np.array(pace), stuck)
+    return Driven(np.array(out), kinds, np.array(pace), np.array(stops))
 
 
 def _curve(

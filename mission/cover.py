@@ -46,14 +46,22 @@ def cover(
     there is nothing to cover or nobody to cover it, or no spacing, or the area holds no free cell at this spacing. What
     vehicles cannot do is told in the mission's `reasons`.
     """
+    step = covering(scenario, spacing)
+    grid = place(trackable(scenario, step), step, seed=seed, method=placement, angle=angle).grid
+    return cover_grid(scenario, grid, edge=edge, seed=seed, parameters={"placement": placement})
+
+
+def covering(scenario: Scenario, spacing: float | None) -> float:
+    """Return the track spacing in metres of a scenario that is to be covered, before long work begins.
+
+    Raises InputError if there is no area or no vehicle, no spacing, or the shares are wrong.
+    """
     if not scenario.site.areas:
         raise InputError('no feature has the role "area"; draw what is to be covered')
     if not scenario.vehicles:
         raise InputError('no feature has the role "vehicle"; add a Point with "role": "vehicle" where one starts')
-    shares(scenario.vehicles)  # wrong shares are refused before long work begins
-    step = track_spacing(scenario, spacing)
-    grid = place(trackable(scenario, step), step, seed=seed, method=placement, angle=angle).grid
-    return cover_grid(scenario, grid, edge=edge, seed=seed, parameters={"placement": placement})
+    shares(scenario.vehicles)
+    return track_spacing(scenario, spacing)
 
 
 def cover_grid(
@@ -63,7 +71,7 @@ def cover_grid(
     vehicles, site, step = scenario.vehicles, scenario.site, grid.spacing
     parts_of_all = shares(vehicles)
     roads = roadmaps(scenario)
-    regions, notes = _regions(grid, vehicles, parts_of_all, roads, seed)
+    regions, notes = divided(scenario, grid, roads, seed)
     laid = iter(lay_tracks(trackable(scenario, step), grid, [t for region in regions for t in region.tours], edge=edge))
     tracks = [[next(laid) for _ in region.tours] for region in regions]
     routes, reasons = survey_routes(vehicles, tracks, roads)
@@ -167,13 +175,13 @@ class Region:
         return int(self.mask.sum())
 
 
-def _regions(
-    grid: Grid, vehicles: Sequence[Vehicle], parts_of_all: np.ndarray, roads: Sequence[Roadmap], seed: int
-) -> tuple[list[Region], list[str]]:
+def divided(scenario: Scenario, grid: Grid, roads: Sequence[Roadmap], seed: int) -> tuple[list[Region], list[str]]:
     """Divide the free hypervertices, each connected part among those that a transport problem sends there.
 
     Returns the vehicles' regions, and notes on shares that could not be had.
     """
+    vehicles = scenario.vehicles
+    parts_of_all = shares(vehicles)
     free, k = grid.hypervertices, len(vehicles)
     if not free.any():  # all is covered already, or all that is left has no room: everyone goes home
         return [Region(np.zeros_like(free), [], 0)] * k, []

@@ -13,6 +13,7 @@ from quarterdeck.mission.corners import driven, with_turns
 from quarterdeck.mission.mission import Leg, Route
 from quarterdeck.mission.timing import shortfalls, timed_route
 
+PIVOT = np.pi  # radians: a turn on the spot, at the most
 LAYER_STEP = 5.0  # m between the altitudes at which aerial vehicles transit
 
 
@@ -50,22 +51,31 @@ def line_routes(
     vehicles: Sequence[Vehicle], lines: Sequence[Sequence[np.ndarray]], roads: Sequence[Roadmap]
 ) -> tuple[tuple[Route, ...], list[str]]:
     """Return each vehicle's route along its (n, 2) survey lines in their order, and home; and why some cannot be done."""
+    ways = [_linked(vehicle, own, road) for vehicle, own, road in zip(vehicles, lines, roads, strict=True)]
+    routes, reasons = way_routes(vehicles, [(points, legs) for points, legs, _ in ways], roads)
+    return routes, [reason for _, _, missing in ways for reason in missing] + reasons
+
+
+def way_routes(
+    vehicles: Sequence[Vehicle], ways: Sequence[tuple[np.ndarray, Sequence[Leg]]], roads: Sequence[Roadmap]
+) -> tuple[tuple[Route, ...], list[str]]:
+    """Return each vehicle's route along its way, (n, 2) metres and the kind of each leg, and why some cannot be done.
+
+    Corners become drivable (where nothing else has room, by a stop and a turn on the spot), aerial vehicles climb and land,
+    launches are staggered, times and energy are filled in.
+    """
     routes, reasons = [], []
-    for i, (vehicle, own, road) in enumerate(zip(vehicles, lines, roads, strict=True)):
-        points, legs, missing = _linked(vehicle, own, road)
+    for i, (vehicle, (points, legs), road) in enumerate(zip(vehicles, ways, roads, strict=True)):
         path = with_turns(points, legs, vehicle.turn_radius, road.polygon)
-        reasons += missing + [
-            f"{vehicle.id}: no room to turn at {vehicle.turn_radius:g} m, {x:.0f} m east and {y:.0f} m north of the centre"
-            for x, y in path.stuck
-        ]
         xyz, kinds, pace = np.column_stack([path.points, np.zeros(len(path.points))]), path.legs, path.pace
+        holds = np.where(path.stops, PIVOT / vehicle.model.turn_rate, 0.0)
         if vehicle.domain == "aerial" and len(xyz) > 1:
             survey = np.array([leg == "survey" for leg in kinds])
             xyz[:, 2] = np.where(survey, vehicle.altitude, vehicle.altitude + (i + 1) * LAYER_STEP)
             xyz, kinds = _with_takeoff(xyz, kinds)
-            pace = np.ones(len(xyz))
-        wait = _launch_delay(vehicles, i)
-        route = timed_route(vehicle, xyz, kinds, holds=[wait, *[0.0] * (len(xyz) - 1)], pace=pace)
+            pace, holds = np.ones(len(xyz)), np.zeros(len(xyz))
+        holds[0] = _launch_delay(vehicles, i)
+        route = timed_route(vehicle, xyz, kinds, holds=holds.tolist(), pace=pace)
         routes.append(route)
         reasons += shortfalls(vehicle, route)
     return tuple(routes), reasons

@@ -15,15 +15,34 @@ from quarterdeck.mission.planfile import plan_text, read_plan
 __all__ = ["export", "plan", "plan_text", "read_plan", "read_scenario", "simulate", "write_plan"]
 
 
-def plan(scenario: Scenario, *, method: Literal["stc"] = "stc", seed: int = 0, **options: Any) -> Mission:
+Method = Literal["stc", "lines", "guards"]
+
+
+def plan(scenario: Scenario, *, method: Method | None = None, seed: int = 0, **options: Any) -> Mission:
     """Return a mission that covers the scenario's areas.
 
-    `stc` divides a placed grid and walks spanning trees (`quarterdeck.mission.cover.cover`); `options` are that planner's,
-    such as `spacing` in metres. Raises InputError if the scenario cannot be planned as it is.
+    `stc` divides a placed grid and walks spanning trees (`quarterdeck.mission.cover.cover`), `lines` surveys by parallel
+    lines (`quarterdeck.mission.lines.plan_lines`), `guards` sees every point from within a limited range
+    (`quarterdeck.mission.guards.plan_guards`); `options` are theirs. None: lines where a vehicle has a sensor, else stc.
+    Raises InputError if the scenario cannot be planned as it is.
     """
+    method = method or default_method(scenario)
+    if method == "guards":
+        from quarterdeck.mission.guards import plan_guards
+
+        return plan_guards(scenario, seed=seed, **options)
+    if method == "lines":
+        from quarterdeck.mission.lines import plan_lines
+
+        return plan_lines(scenario, seed=seed, **options)
     from quarterdeck.mission.cover import cover
 
-    return {"stc": cover}[method](scenario, seed=seed, **options)
+    return cover(scenario, seed=seed, **options)
+
+
+def default_method(scenario: Scenario) -> Method:
+    """Return the method that survey teams expect: lines where a vehicle has a sensor, else spanning trees."""
+    return "lines" if any(v.sensor for v in scenario.vehicles) else "stc"
 
 
 def simulate(mission: Mission, **options: Any) -> Any:

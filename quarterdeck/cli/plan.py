@@ -2,32 +2,57 @@
 
 import json
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from quarterdeck.cli.output import emit, force_option, output_option, print_figures, seed_option
 
+if TYPE_CHECKING:
+    from quarterdeck.api import Method
+
+OPTIONS = {
+    "stc": ("spacing", "placement", "angle", "edge"),
+    "lines": ("spacing", "angle", "run", "cross_every"),
+    "guards": ("range", "mode", "inspect"),
+}
+
 
 @click.command(short_help="Cover an area.")
 @click.argument("site", default="-")
 @output_option
-@click.option("--spacing", type=float, help="Metres between neighbouring tracks (the paper's 2 delta); default the site's.")
-@click.option("--placement", type=click.Choice(["annealed", "paper", "none"]), default="annealed", show_default=True,
-              help="How the grid is placed: annealed, as the paper's Algorithm 1 is printed, or not.")  # fmt: skip
-@click.option("--angle", type=float, help="Fix the direction of the tracks: compass degrees.")
-@click.option("--edge", type=click.Choice(["whole", "cells", "lap"]), default="cells", show_default=True,
-              help="How far tracks reach: whole 2 x 2 cells, every free cell, or laps along borders too.")  # fmt: skip
+@click.option("--method", type=click.Choice(list(OPTIONS)),
+              help="stc: spanning trees; lines: parallel lines (default where a vehicle has a sensor); "
+              "guards: all seen from within a range.")  # fmt: skip
+@click.option("--spacing", type=float, help="stc, lines: metres between neighbouring tracks (the paper's 2 delta).")
+@click.option("--placement", type=click.Choice(["annealed", "paper", "none"]),
+              help="stc: how the grid is placed: annealed (default), as Algorithm 1 is printed, or not.")  # fmt: skip
+@click.option("--angle", type=float, help="stc, lines: fix the tracks' direction: compass degrees.")
+@click.option("--edge", type=click.Choice(["whole", "cells", "lap"]),
+              help="stc: how far tracks reach: whole 2 x 2 cells, every free cell (default), or laps too.")  # fmt: skip
+@click.option("--run", type=float, help="lines: metres driven straight before and after each line.")
+@click.option("--cross-every", type=int, help="lines: add lines across, so many spacings apart.")
+@click.option("--range", type=float, help="guards: metres that vehicles see which have no range of their own.")
+@click.option("--mode", type=click.Choice(["optimised", "paper"]), help="guards: as the paper, or better (default).")
+@click.option(
+    "--inspect", type=click.Choice(["area", "border"]), help="guards: see all of the area (default), or all edges."
+)
 @seed_option
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on standard error instead of a table.")
 @force_option
-def command(site: str, output: str, angle: float | None, as_json: bool, force: bool, **options: Any) -> int:
+def command(site: str, output: str, method: "Method | None", seed: int, as_json: bool, force: bool, **options: Any) -> int:
     """Plan a mission that covers the areas of SITE, a GeoJSON file (- reads standard input), and write it as a PLAN."""
-    from quarterdeck.api import plan, plan_text, read_scenario
+    from quarterdeck.api import default_method, plan, plan_text, read_scenario
 
+    given = {name: value for name, value in options.items() if value is not None}
     scenario = read_scenario(site)
-    turned = None if angle is None else math.radians(90.0 - angle)
-    mission = plan(scenario, angle=turned, **options)
+    method = method or default_method(scenario)
+    for name in given:
+        if name not in OPTIONS[method]:
+            raise click.UsageError(f"--{name.replace('_', '-')} does not belong to --method {method}")
+    if "angle" in given:
+        given["angle"] = math.radians(90.0 - given["angle"])
+    mission = plan(scenario, method=method, seed=seed, **given)
     text = plan_text(mission)
     emit(text, output, force=force)
     if as_json:

@@ -26,7 +26,7 @@ def test_wide_corners_stay():
     line = np.array([[0, 0], [100, 0], [100, 100], [0, 100.0]])
     path = with_turns(line, ["start", "survey", "survey", "survey"], 10.0, SEA)
     assert np.array_equal(path.points, line)
-    assert not path.stuck
+    assert not path.stops.any()
     track = driven(line, 10.0)
     assert curvature(track) > 9.9
     assert math.isclose(LineString(track).distance(Point(100, 0)), 10 * (math.sqrt(2) - 1), rel_tol=1e-2)
@@ -39,7 +39,7 @@ def test_narrow_u_turns_become_curves(gap, radius):
     line = np.array([[0, 0], [300, 0], [300, gap], [0, gap]])
     path = with_turns(line, ["start", "survey", "survey", "survey"], radius, SEA)
     points, legs = path.points, path.legs
-    assert not path.stuck
+    assert not path.stops.any()
     assert len(points) == len(legs) == len(path.pace)
     assert curvature(points) > 0.9 * radius or "turn" not in legs
     assert curvature(driven(points, radius)) > 0.9 * radius or "turn" in legs
@@ -52,5 +52,5 @@ def test_no_room_is_told():
     channel = MultiPolygon([box(-1, -1, 101, 10.5)])
     line = np.array([[0, 0], [100, 0], [100, 10], [0, 10.0]])
     path = with_turns(line, ["start", "survey", "survey", "survey"], 80.0, channel)
-    assert len(path.stuck) >= 1
+    assert path.stops.any()
     assert np.array_equal(path.points, line)

@@ -1,0 +1,114 @@
+"""Parallel lines: the division of a placed grid, each region surveyed by lines, as sonar and camera teams expect."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+
+import numpy as np
+from shapely import LineString
+
+from quarterdeck.coverage.lines import Lines, lay_lines, split_area
+from quarterdeck.coverage.metrics import measure
+from quarterdeck.coverage.placement import place
+from quarterdeck.geo.scenario import Scenario, Vehicle
+from quarterdeck.geo.transit import Roadmap, shortest_paths
+from quarterdeck.geo.version import VERSION
+from quarterdeck.mission.cover import covering, divided, roadmaps, trackable
+from quarterdeck.mission.mission import Layer, Leg, Mission
+from quarterdeck.mission.routes import way_routes
+
+
+def plan_lines(
+    scenario: Scenario,
+    *,
+    spacing: float | None = None,
+    seed: int = 0,
+    angle: float | None = None,
+    run: float = 0.0,
+    cross_every: int = 0,
+) -> Mission:
+    """Return the mission that surveys the scenario's areas by parallel lines, `spacing` metres apart.
+
+    `angle` is the lines' direction in radians counter-clockwise from east (None: each vehicle's cheapest), `run` the metres
+    driven straight before and after each line, `cross_every` n > 0 adds lines across, n spacings apart. Raises
+    InputError as `cover` does.
+    """
+    step = covering(scenario, spacing)
+    area = trackable(scenario, step)
+    grid = place(area, step, seed=seed, angle=angle).grid
+    vehicles, roads = scenario.vehicles, roadmaps(scenario)
+    regions, notes = divided(scenario, grid, roads, seed)
+    labels = np.full(grid.hypervertices.shape, -1)
+    for i, region in enumerate(regions):
+        labels[region.mask] = i
+    parts = split_area(area, grid, labels, len(vehicles))
+    laid = [
+        lay_lines(area, part, step, road, angle=angle, run=run, cross_every=cross_every, start=v.start)
+        for v, part, road in zip(vehicles, parts, roads, strict=True)
+    ]
+    ways = [_way(v, lines, road) for v, lines, road in zip(vehicles, laid, roads, strict=True)]
+    routes, reasons = way_routes(vehicles, [(points, legs) for points, legs, _ in ways], roads)
+    missing = [reason for _, _, found in ways for reason in found]
+    missing += [
+        f"{v.id}: no way to {lines.unreached} pieces of its lines"
+        for v, lines in zip(vehicles, laid, strict=True)
+        if lines.unreached
+    ]
+    figures = asdict(measure([t for lines in laid for t in lines.tracks], scenario.site.coverable, grid))
+    del figures["turns"], figures["turns_per_1000_m2"], figures["cell_poc"]  # of lanes of a grid; there is none here
+    figures |= {
+        "lines": sum(len(lines.swaths) for lines in laid),
+        "makespan": max(r.duration for r in routes),
+        "energy": sum(r.energy for r in routes),
+        "notes": notes,
+    }
+    return Mission(
+        name=scenario.name,
+        frame=scenario.frame,
+        site=scenario.site,
+        vehicles=vehicles,
+        routes=routes,
+        method="lines",
+        parameters={"spacing": step, "angle": angle, "run": run, "cross_every": cross_every},
+        seed=seed,
+        spacing=step,
+        tasks=scenario.tasks,
+        figures=figures,
+        reasons=tuple(missing + reasons),
+        layers=(_named(vehicles, laid),),
+        input_hash=scenario.input_hash,
+        version=VERSION,
+    )
+
+
+def _way(vehicle: Vehicle, lines: Lines, road: Roadmap) -> tuple[np.ndarray, list[Leg], list[str]]:
+    """Return (n, 2) metres out, along all lines with their runs and links, and home; the kind of each leg; what fails."""
+    points: list[tuple[float, float]] = [vehicle.start]
+    legs: list[Leg] = ["start"]
+    if not lines.swaths:
+        return np.array(points), legs, []
+    way_out = shortest_paths(road, np.array(vehicle.start), np.array(lines.swaths[0].run_in))[1][0][0]
+    way_home = shortest_paths(road, np.array(lines.swaths[-1].run_out), np.array(vehicle.home))[1][0][0]
+    if way_out is None or way_home is None:
+        return np.array(points), legs, [f"{vehicle.id}: no way between its start, its region and its end; move them"]
+    links = [way_out, *lines.links, way_home]
+    for link, swath in zip(links, lines.swaths, strict=False):
+        for point in [*link[1:].tolist(), swath.start]:
+            _add(points, legs, point, "transit")
+        _add(points, legs, swath.end, "survey")
+        _add(points, legs, swath.run_out, "transit")
+    for point in way_home[1:].tolist():
+        _add(points, legs, point, "transit")
+    return np.array(points), legs, []
+
+
+def _add(points: list[tuple[float, float]], legs: list[Leg], point: Sequence[float], leg: Leg) -> None:
+    if np.hypot(point[0] - points[-1][0], point[1] - points[-1][1]) > 1e-6:
+        points.append((float(point[0]), float(point[1])))
+        legs.append(leg)
+
+
+def _named(vehicles: Sequence[Vehicle], laid: Sequence[Lines]) -> Layer:
+    """Return the lines with their names, for the eye and for the log."""
+    swaths = [(v.id, s) for v, lines in zip(vehicles, laid, strict=True) for s in lines.swaths]
+    properties = tuple({"name": s.name, "vehicle": owner, "cross": s.cross} for owner, s in swaths)
+    return Layer("line", tuple(LineString([s.start, s.end]) for _, s in swaths), properties)
