@@ -9,16 +9,18 @@ from shapely import MultiPolygon, Polygon, is_valid_reason, union_all
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.frame import Frame
+from quarterdeck.geo.importers import as_geojson
 from quarterdeck.geo.scenario import as_multipolygon
 
 WGS84_NAMES = ("urn:ogc:def:crs:OGC:1.3:CRS84", "urn:ogc:def:crs:OGC::CRS84", "urn:ogc:def:crs:EPSG::4326", "EPSG:4326")
 
 
 def parse(data: bytes) -> dict[str, Any]:
-    """Return the FeatureCollection in `data`; a single Feature becomes one.
+    """Return the FeatureCollection in `data`; a single Feature becomes one, KML, KMZ, GPX and .plan are converted.
 
     Raises InputError if it is not JSON (RFC 8259: no NaN), not GeoJSON, or in another system than WGS84.
     """
+    data = as_geojson(data)
     try:
         document = json.loads(data.decode("utf-8-sig"), parse_constant=_refuse_constant)
     except UnicodeDecodeError:

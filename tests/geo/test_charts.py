@@ -2,6 +2,8 @@
 
 import json
 import math
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -125,3 +127,31 @@ def test_a_real_cell_gives_a_site(tmp_path, capsys):
     assert "not for navigation" in said
     roles = [f["properties"]["role"] for f in json.loads(site.read_text())["features"]]
     assert {"operating", "area"} <= set(roles)
+
+
+def test_our_sample_chart_gives_a_site_that_plans(tmp_path, capsys):
+    """The packaged chart, update applied, gives a site whose plan is sound; its maker makes the same bytes again."""
+    pytest.importorskip("pyogrio", reason="the extra charts is not installed")
+    from quarterdeck.api import plan, read_scenario
+    from quarterdeck.mission.check import check_mission
+
+    root = Path(__file__).resolve().parents[2]
+    site = tmp_path / "site.geojson"
+    arguments = ["--draught", "1.2", "--bounds", "5.0,58.0,5.02,58.01", "--start", "5.004,58.004", "--spacing", "100"]
+    with pytest.raises(SystemExit) as stop:
+        main(["chart", str(root / "data" / "sample_chart.000"), *arguments, "-o", str(site)])
+    assert stop.value.code == 0
+    assert "update 1" in capsys.readouterr().err
+    scenario = read_scenario(site)
+    islet = scenario.frame.to_metres([(5.011, 58.0045)])[0]
+    assert not scenario.site.coverable.contains(Point(islet))
+    mission = plan(scenario)
+    assert all("needs" in line for line in check_mission(mission))  # but for the battery it can be driven
+
+
+def test_the_sample_chart_is_what_its_maker_makes(tmp_path):
+    """data/sample_chart.000 and .001 are examples/make_chart.py's."""
+    root = Path(__file__).resolve().parents[2]
+    subprocess.run([sys.executable, root / "examples" / "make_chart.py", tmp_path / "chart"], check=True)
+    for ending in (".000", ".001"):
+        assert (tmp_path / f"chart{ending}").read_bytes() == (root / "data" / f"sample_chart{ending}").read_bytes()
