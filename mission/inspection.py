@@ -24,13 +24,14 @@ class _Stage:
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """What the director knows: `stage` and `serving` of each vehicle, tasks `done`, vehicles `lost`, tasks `abandoned`.
+    """What the director knows: how many stages each vehicle was `sent` to do, which vehicles are `waiting` at their next
+    task.
 
-    `serving` is true once the service of the stage is commanded.
+    `done` are the tasks served, `lost` the vehicles, `abandoned` the tasks that nobody will do any more.
     """
 
-    stage: Mapping[str, int]
-    serving: Mapping[str, bool]
+    sent: Mapping[str, int]
+    waiting: frozenset[str] = frozenset()
     done: frozenset[str] = frozenset()
     lost: frozenset[str] = frozenset()
     abandoned: frozenset[str] = frozenset()
@@ -45,66 +46,54 @@ def inspection(mission: Mission) -> Director:
     def direct(
         time: float, states: Mapping[str, State], events: tuple[Event, ...], memory: Any
     ) -> tuple[dict[str, Command], Memory]:
-        if memory is None:
-            memory = Memory(dict.fromkeys(stages, 0), dict.fromkeys(stages, False))
-            return _departures(time, memory, list(stages))
-        done = memory.done | {e.subject for e in events if e.kind == "served" and e.subject in before}
-        lost = memory.lost | {e.vehicle for e in events if e.kind == "lost"}
-        lost |= {v for v in stages if not states[v].alive}
-        stage, serving = dict(memory.stage), dict(memory.serving)
+        known = memory if memory is not None else Memory(dict.fromkeys(stages, 0))
+        done = known.done | {e.subject for e in events if e.kind == "served" and e.subject in before}
+        lost = known.lost | {e.vehicle for e in events if e.kind == "lost"} | {v for v in stages if not states[v].alive}
+        sent, waiting = dict(known.sent), set(known.waiting)
         commands: dict[str, Command] = {}
-        leaving = []
-        for vehicle, own in stages.items():
-            here = stage[vehicle]
-            if vehicle in lost or here >= len(own):
-                continue
-            task = own[here].task
-            if serving[vehicle] and task in done:
-                stage[vehicle], serving[vehicle] = here + 1, False
-                leaving.append(vehicle)
-            elif states[vehicle].idle and not serving[vehicle] and task is not None and before[task] <= done:
-                commands[vehicle] = Command(_service(own[here], opens[task], time))
-                serving[vehicle] = True
-        memory = Memory(stage, serving, done, lost, memory.abandoned)
-        more, memory = _departures(time, memory, leaving)
-        commands |= more
-        if not commands and all(_at_rest(v, states, memory) for v in stages if v not in lost):
-            return _give_up(memory, states)
-        return commands, memory
+        for vehicle in stages:
+            if states[vehicle].idle and vehicle not in lost:
+                way, sent[vehicle], wait = _onward(vehicle, sent[vehicle], vehicle in waiting, done, time)
+                waiting = waiting | {vehicle} if wait else waiting - {vehicle}
+                if way:
+                    commands[vehicle] = Command(way)
+        known = Memory(sent, frozenset(waiting), done, lost, known.abandoned)
+        if not commands and waiting - lost and all(states[v].idle for v in stages if v not in lost):
+            return _give_up(known, states)
+        return commands, known
 
-    def _departures(time: float, memory: Memory, leaving: list[str]) -> tuple[dict[str, Command], Memory]:
-        """Send vehicles to their next task, and have it served at once where nothing need be waited for."""
-        commands, serving = {}, dict(memory.serving)
-        for vehicle in leaving:
-            if memory.stage[vehicle] >= len(stages[vehicle]):
-                continue
-            own = stages[vehicle][memory.stage[vehicle]]
-            way = own.way
-            if own.task is not None and before[own.task] <= memory.done and opens[own.task] <= time:
-                way += _service(own, opens[own.task], time)
-                serving[vehicle] = True
-            commands[vehicle] = Command(way)
-        return commands, replace(memory, serving=serving)
-
-    def _at_rest(vehicle: str, states: Mapping[str, State], memory: Memory) -> bool:
-        own, here = stages[vehicle], memory.stage[vehicle]
-        waiting = here < len(own) and own[here].task is not None and not memory.serving[vehicle]
-        return states[vehicle].idle and (waiting or here >= len(own) or own[here].task is None)
+    def _onward(
+        vehicle: str, first: int, there: bool, done: frozenset[str], time: float
+    ) -> tuple[tuple[Waypoint, ...], int, bool]:
+        """Return all that can be done from stage `first` on without waiting, the next stage, and whether to wait for it."""
+        way: tuple[Waypoint, ...] = ()
+        for i, stage in enumerate(stages[vehicle][first:], first):
+            way += () if there and i == first else stage.way
+            if stage.task is None or stage.service is None:
+                return way, i + 1, False
+            if not before[stage.task] <= done:
+                return way, i, True
+            if opens[stage.task] > time:  # when it will be there is not known: it drives there, then waits by the clock
+                if not (there and i == first):
+                    return way, i, True
+                way += (replace(stage.service, task=None, hold=opens[stage.task] - time),)
+            way += (stage.service,)
+            done |= {stage.task}
+        return way, len(stages[vehicle]), False
 
     def _give_up(memory: Memory, states: Mapping[str, State]) -> tuple[dict[str, Command], Memory]:
         """Send home, by the way it came, whoever waits for what nobody will do."""
-        commands, stage, abandoned = {}, dict(memory.stage), set(memory.abandoned)
-        for vehicle, own in stages.items():
-            here = stage[vehicle]
-            if vehicle in memory.lost or here >= len(own) or own[here].task is None:
-                continue
+        commands, sent, abandoned = {}, dict(memory.sent), set(memory.abandoned)
+        for vehicle in sorted(memory.waiting - memory.lost):
+            own, here = stages[vehicle], sent[vehicle]
             abandoned |= {s.task for s in own[here:] if s.task is not None}
-            back = [w for s in own[: here + 1] for w in (*s.way, *((s.service,) if s.service else ()))][::-1]
             start = next(route.waypoints[0] for route in mission.routes if route.vehicle == vehicle)
-            way = [replace(w, hold=0.0, task=None) for w in [*back, start]]
-            commands[vehicle] = Command(tuple(way) if not states[vehicle].z else _grounded(way))
-            stage[vehicle] = len(own)
-        return commands, replace(memory, stage=stage, abandoned=frozenset(abandoned))
+            way = [
+                replace(w, hold=0.0, task=None, time=0.0) for w in [start, *(w for s in own[: here + 1] for w in s.way)]
+            ][-2::-1]
+            commands[vehicle] = Command(_grounded(way) if states[vehicle].z else tuple(way))
+            sent[vehicle] = len(own)
+        return commands, replace(memory, sent=sent, waiting=frozenset(), abandoned=frozenset(abandoned))
 
     return direct
 
@@ -117,7 +106,8 @@ def default_director(mission: Mission) -> Director:
 def _stages(waypoints: tuple[Waypoint, ...], mission: Mission) -> list[_Stage]:
     service = {task.id: task.service_time for task in mission.tasks}
     stages, way = [], []  # type: list[_Stage], list[Waypoint]
-    for waypoint in waypoints[1:]:
+    for planned in waypoints[1:]:
+        waypoint = replace(planned, time=0.0)  # a plan's arrival; in a command it would be a departure to wait for
         if waypoint.task is None:
             way.append(waypoint)
             continue
@@ -125,14 +115,6 @@ def _stages(waypoints: tuple[Waypoint, ...], mission: Mission) -> list[_Stage]:
         stages.append(_Stage(tuple(way), waypoint.task, replace(waypoint, hold=service[waypoint.task])))
         way = []
     return [*stages, _Stage(tuple(way), None, None)] if way else stages
-
-
-def _service(stage: _Stage, opens: float, time: float) -> tuple[Waypoint, ...]:
-    """Return the waypoints that serve a task: first a wait where its window is not open yet."""
-    service = stage.service
-    if service is None:
-        return ()
-    return (*((replace(service, task=None, hold=opens - time),) if opens > time else ()), service)
 
 
 def _grounded(way: list[Waypoint]) -> tuple[Waypoint, ...]:

@@ -5,6 +5,7 @@ import click
 from quarterdeck.cli import LazyGroup
 
 PAPERS: dict[str, str] = {
+    "inspection": "Case studies of tasks with priority, time and precedence.",
     "ecdis": "Coverage by several USVs beside an ECDIS.",
     "triage": "Table I and Figs 6 to 9 of the triage paper.",
 }
