@@ -14,8 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from quarterdeck.cli.output import console, force_option, seed_option
-
 if TYPE_CHECKING:
     import numpy as np
 
@@ -50,8 +48,8 @@ CASES = {
 @click.option("--distances", metavar="FILE.json", help='{"dist": 7 x 7}: tasks 0-4, then the two depots, in metres.')
 @click.option("-o", "--output", metavar="FOLDER", help="Write a picture of each case there, on our own hall.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on standard output.")
-@seed_option
-@force_option
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Seed of all that is random.")
+@click.option("--force", is_flag=True, help="Overwrite existing files.")
 def command(distances: str | None, output: str | None, as_json: bool, seed: int, force: bool) -> None:
     """Compare the paper's published plans with the best of all plans under its eq. 4-6, and with what we find."""
     rows = results(read_distances(distances), seed)
@@ -154,9 +152,10 @@ def problem_of(case: Case, dist: np.ndarray, *, paper: bool) -> Problem:
 
 
 def _print(rows: list[dict[str, Any]], where: str) -> None:
+    from rich.console import Console
     from rich.table import Table
 
-    screen = console()
+    screen = Console(width=124, highlight=False)
     table = Table(title=f"Case studies on {where}: fitness under eq. 4-6, seconds", title_justify="left")
     for column in ("case", "published"):
         table.add_column(column, no_wrap=True)
@@ -220,7 +219,7 @@ def _draw(folder: Path, seed: int, *, force: bool) -> None:
     from quarterdeck.mission.planfile import COLOURS
 
     for name, case in CASES.items():
-        figure = Figure(figsize=(13, 5.6), layout="constrained")
+        figure = Figure(figsize=(13, 6.2), layout="tight")
         axes = figure.subplots(1, 2)
         for ax, objective in zip(axes, ("paper", "operator"), strict=True):
             mission = case_mission(name, seed, objective)
@@ -245,14 +244,20 @@ def _draw(folder: Path, seed: int, *, force: bool) -> None:
                 said += f" {task.service_time:.0f} s" * bool(task.service_time)
                 said += "".join(f" after t{a}" for a, b in case.after if b == i)
                 ax.annotate(
-                    f"{said}\nat {starts[task.id]:.0f} s", task.position, (6, 6), textcoords="offset points", fontsize=9
+                    f"{said}\nat {starts[task.id]:.0f} s",
+                    task.position,
+                    (6, 6),
+                    textcoords="offset points",
+                    fontsize=9,
+                    zorder=6,
+                    bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.8},
                 )
             ax.set_aspect("equal")
             ax.set_xlabel("east, m")
             ax.set_ylabel("north, m")
             ax.set_title(f"{name}: {'eq. 4-6 of the paper' if objective == 'paper' else 'what the operator wants'}")
-            ax.legend(loc="lower center", fontsize=9, ncols=2, bbox_to_anchor=(0.5, -0.28), frameon=False)
+            ax.legend(loc="upper left", fontsize=9, ncols=2, bbox_to_anchor=(0.0, -0.1), frameon=False, borderpad=0)
         buffer = io.BytesIO()
         figure.savefig(buffer, dpi=110)
         write_file(folder / f"inspection_{name}.png", buffer.getvalue(), force=force)
-        console().print(f"wrote {folder / f'inspection_{name}.png'}")
+        click.echo(f"wrote {folder / f'inspection_{name}.png'}", err=True)
