@@ -17,19 +17,30 @@ ROUNDS = 400
 PATIENCE = 40
 """Rounds without progress after which the search ends."""
 
+KICKS, KICK_CELLS = 200, 2_000_000
+"""How often hard ground is shaken, and how many cells in all."""
+
 STUCK = 10
 """A border is stuck when less than this part of what it should let pass did."""
 
 
-def balance(labels: np.ndarray, starts: np.ndarray, targets: np.ndarray, width: int, lane: int, seed: int) -> np.ndarray:
+def balance(
+    labels: np.ndarray,
+    starts: np.ndarray,
+    targets: np.ndarray,
+    width: int,
+    lane: int,
+    rng: np.random.Generator,
+    patience: int = PATIENCE,
+) -> np.ndarray:
     """Return the labels of the best balance found; regions stay 4-connected and keep their starts.
 
-    `labels` is (n,) int32, padded and flattened rows of length `width`; `starts` (k,) are cells, `targets` (k,) their
-    numbers. `lane` is the step along which whole runs of cells change hands: 1 rows, `width` columns, 0 no preference.
-    Ends after ROUNDS rounds, or PATIENCE rounds without progress.
+    `labels` is (n,) int32, padded and flattened rows of length `width`; `starts` (k,) are cells, `targets` (k,) real
+    numbers of cells: a region is balanced when it is less than a cell off. `lane` is the step along which whole runs of
+    cells change hands: 1 rows, `width` columns, 0 no preference. Ends after ROUNDS rounds, or `patience` rounds without
+    progress.
     """
     k = len(starts)
-    rng = np.random.default_rng(seed)
     is_start = np.zeros(len(labels), dtype=np.bool_)
     is_start[starts] = True
     labels = labels.copy()
@@ -37,10 +48,12 @@ def balance(labels: np.ndarray, starts: np.ndarray, targets: np.ndarray, width: 
     ease = np.ones((k, k))  # how willingly each border lets cells pass, by what it did
     stale = 0
     for _ in range(ROUNDS):
-        if best_cost[1] == 0 or stale > PATIENCE:
-            break
         sizes, border = _census(labels, k, width)
         surplus = sizes - targets
+        if np.abs(surplus).max() < 1 - 1e-9:
+            return labels
+        if stale > patience:
+            break
         want = _flow(surplus, np.sqrt(border) * ease, targets)
         if want.any() and np.abs(surplus).max() > 2:
             moved = _transfer(labels, is_start, want, width, lane, SIMPLE)
@@ -63,9 +76,57 @@ def balance(labels: np.ndarray, starts: np.ndarray, targets: np.ndarray, width: 
 
 
 def _cost(labels: np.ndarray, targets: np.ndarray) -> tuple[float, float]:
-    """Return the largest excess over a target, in cells but at least 1, and the sum of squares of all differences."""
+    """Return the largest excess over a target in cells, at least 1, and the sum of squares of all differences."""
     difference = np.bincount(labels[labels >= 0], minlength=len(targets)) - targets
-    return max(float(np.abs(difference).max()), 1.0), float((difference**2).sum())
+    return max(float(difference.max()), 1.0), float((difference**2).sum())
+
+
+def rebalance(
+    labels: np.ndarray,
+    starts: np.ndarray,
+    targets: np.ndarray,
+    floor: np.ndarray,
+    width: int,
+    rng: np.random.Generator,
+) -> np.ndarray:
+    """Return better labels for hard ground: blocks are moved at random, then all is balanced again (iterated local search).
+
+    Arguments as for `balance`. Ends when no region has more than its `floor` (k,) cells, or after KICKS kicks, fewer on
+    large ground (KICK_CELLS cells in all).
+    """
+    best, best_cost = labels, _cost(labels, targets)
+    for _ in range(min(KICKS, KICK_CELLS // len(labels))):
+        sizes = np.bincount(best[best >= 0], minlength=len(targets))
+        if (sizes <= floor).all():
+            break
+        loads = sizes / targets
+        heavy = np.flatnonzero(loads > loads.max() * 0.98)
+        kicked = best.copy()
+        for _ in range(rng.integers(1, 4)):
+            region = heavy[rng.integers(len(heavy))] if rng.random() < 0.5 else rng.integers(len(targets))
+            _kick(kicked, starts, region, width, rng)
+        kicked = balance(kicked, starts, targets, width, 0, rng, patience=4)
+        cost = _cost(kicked, targets)
+        if cost <= best_cost:
+            best, best_cost = kicked, cost
+    return best
+
+
+@numba.njit(cache=True)
+def _kick(labels, starts, region, width, rng):  # type: ignore[no-untyped-def]
+    """Give a random border cell of the region, with all that hangs on it, to a neighbour."""
+    number, order, size, low, parent, weight = hanging(labels, starts, width)
+    chosen, to, seen = -1, -1, 0
+    for cell in range(width, len(labels) - width):
+        if labels[cell] == region and weight[cell] > 0:
+            for step in (-1, 1, -width, width):
+                j = labels[cell + step]
+                if j >= 0 and j != region:
+                    seen += 1
+                    if rng.random() * seen < 1:
+                        chosen, to = cell, j
+    if chosen >= 0:
+        move_hanging(labels, chosen, to, width, number, order, size, low, parent)
 
 
 @numba.njit(cache=True)
@@ -288,7 +349,7 @@ def _move_blocks(labels, starts, targets, width, rng, daring):  # type: ignore[n
 
 @numba.njit(cache=True)
 def _chains(labels, starts, targets, width, rng):  # type: ignore[no-untyped-def]
-    """Send single cells along shortest chains of regions from a surplus to a deficit at least two lower.
+    """Send single cells along shortest chains of regions to one whose surplus is lower by more than a cell.
 
     Chains of one call share no region. Returns the number of cells moved.
     """
@@ -318,7 +379,7 @@ def _chains(labels, starts, targets, width, rng):  # type: ignore[no-untyped-def
     came = np.empty(k, dtype=np.int32)
     queue = np.empty(k, dtype=np.int32)
     for source in np.argsort(-surplus + rng.random(k) * 0.5):
-        if surplus[source] <= 0 or not free[source]:
+        if surplus[source] <= 0.0 or not free[source]:
             continue
         came[:] = -1
         came[source] = source
@@ -332,7 +393,7 @@ def _chains(labels, starts, targets, width, rng):  # type: ignore[no-untyped-def
                     came[j] = i
                     queue[last] = j
                     last += 1
-                    if surplus[j] < 0:
+                    if surplus[j] < surplus[source] - 1 - 1e-9 and (surplus[source] >= 1 - 1e-9 or surplus[j] <= 1e-9 - 1):
                         end = j
                         break
         j = end

@@ -1,14 +1,12 @@
 """What a division can reach at best: the fairest targets, and a bound that none can beat.
 
 Loads are cells over share. Pockets are what the starts cut the free cells into: a region can't pass through another's
-start, so a pocket's cells go to the vehicles beside it. Chambers are what lies farther than a distance from all starts:
-only so many vehicles as it has entry cells can work there, and each has spent that distance on the way.
+start, so a pocket's cells go to the vehicles beside it. What lies behind necks is bounded in chambers.py.
 """
 
 import math
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from scipy.ndimage import label
 from scipy.sparse import csr_array
@@ -103,96 +101,18 @@ def _round(wanted: np.ndarray, total: int) -> np.ndarray:
     return whole
 
 
-def lower_bound(reachable: np.ndarray, starts: np.ndarray, shares: np.ndarray, loads: np.ndarray) -> Bound:
-    """Return the best bound known: all cells over all shares, the fairest loads of pockets, and the farthest chambers.
+def pocket_bound(reachable: np.ndarray, starts: np.ndarray, loads: np.ndarray, shares: np.ndarray) -> Bound:
+    """Return the better of two bounds: all cells over all shares, and the fairest load of the fullest pockets.
 
     Arguments as in `fair_targets`, which gives `loads`.
     """
     total = int(reachable.sum())
-    bounds = [Bound(float(total), f"{total} cells shared by {len(starts)} vehicles")]
     heaviest = float(loads.max())
-    if heaviest > total * (1 + 1e-9):
-        few = np.flatnonzero(loads > heaviest * (1 - 1e-9))
-        cells = round(heaviest * float(shares[few].sum()))
-        bounds.append(Bound(heaviest, f"the other starts shut {cells} cells in with {len(few)} of {len(starts)} vehicles"))
-    padded = np.pad(reachable, 1)
-    width = padded.shape[1]
-    flat = (starts[:, 0] + 1) * width + starts[:, 1] + 1
-    strongest = np.cumsum(np.sort(shares)[::-1])
-    load, cells, entries, away = _chambers(padded.ravel(), flat, width, strongest)
-    far = f"{cells} cells lie beyond {entries} entry cells, {away} or more from every start"
-    bounds.append(Bound(float(load), far))
-    best = bounds[0]
-    for other in bounds[1:]:
-        if other.load > best.load * (1 + 1e-9):
-            best = other
-    return best
-
-
-@numba.njit(cache=True)
-def _chambers(free, starts, width, strongest):  # type: ignore[no-untyped-def]
-    """Return the largest load that a chamber proves, and the chamber: its cells, entry cells, distance.
-
-    Cells join from far to near; when all at one distance d have joined, each component is a chamber whose entries are its
-    cells at d: w vehicles can enter, each with d cells on its way, so w loads less w d cells must hold the chamber.
-    """
-    n, k = len(free), len(strongest)
-    distance = np.full(n, -1, dtype=np.int32)
-    order = np.empty(n, dtype=np.int32)
-    last = 0
-    for start in starts:
-        distance[start] = 0
-        order[last] = start
-        last += 1
-    first = 0
-    while first < last:
-        cell = order[first]
-        first += 1
-        for step in (-1, 1, -width, width):
-            if free[cell + step] and distance[cell + step] < 0:
-                distance[cell + step] = distance[cell] + 1
-                order[last] = cell + step
-                last += 1
-
-    root = np.full(n, -1, dtype=np.int32)
-    size = np.zeros(n, dtype=np.int32)
-    entries = np.zeros(n, dtype=np.int32)
-    best, best_cells, best_entries, best_away = 0.0, 0, 0, 0
-    at = last - 1
-    while at >= 0 and distance[order[at]] > 0:
-        d = distance[order[at]]
-        begin = at
-        while at >= 0 and distance[order[at]] == d:
-            cell = order[at]
-            root[cell], size[cell], entries[cell] = cell, 1, 0
-            for step in (-1, 1, -width, width):
-                if root[cell + step] >= 0:
-                    a, b = _find(root, cell), _find(root, cell + step)
-                    if a != b:
-                        if size[a] < size[b]:
-                            a, b = b, a
-                        root[b] = a
-                        size[a] += size[b]
-            at -= 1
-        for i in range(begin, at, -1):
-            entries[_find(root, order[i])] = 0
-        for i in range(begin, at, -1):
-            entries[_find(root, order[i])] += 1
-        for i in range(begin, at, -1):
-            top = _find(root, order[i])
-            w = min(entries[top], k)
-            load = (size[top] + w * d) / strongest[w - 1]
-            if load > best:
-                best, best_cells, best_entries, best_away = load, size[top], entries[top], d
-    return best, best_cells, best_entries, best_away
-
-
-@numba.njit(cache=True)
-def _find(root: np.ndarray, a: int) -> int:
-    while root[a] != a:
-        root[a] = root[root[a]]
-        a = root[a]
-    return a
+    if heaviest <= total * (1 + 1e-9):
+        return Bound(float(total), f"{total} cells shared by {len(starts)} vehicles")
+    few = loads > heaviest * (1 - 1e-9)
+    cells = round(heaviest * float(shares[few].sum()))
+    return Bound(heaviest, f"the other starts shut {cells} cells in with {few.sum()} of {len(starts)} vehicles")
 
 
 def cells_at_least(bound: Bound, shares: np.ndarray) -> np.ndarray:

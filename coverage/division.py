@@ -11,9 +11,10 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import KDTree
 
-from quarterdeck.coverage.balance import balance
-from quarterdeck.coverage.bound import cells_at_least, fair_targets, lower_bound
+from quarterdeck.coverage.balance import balance, rebalance
+from quarterdeck.coverage.bound import cells_at_least, fair_targets, pocket_bound
 from quarterdeck.coverage.bricks import straight_trees, tree_turns
+from quarterdeck.coverage.chambers import chamber_bound
 from quarterdeck.coverage.growth import grow
 from quarterdeck.coverage.recombine import recombine
 from quarterdeck.geo.errors import InputError
@@ -79,23 +80,31 @@ def divide(
     grown = [grow(padded.ravel(), cells, width, across, along)[0] for across, along, _ in lanes]
     reachable = (grown[0] >= 0).reshape(padded.shape)[1:-1, 1:-1]
     targets, loads = fair_targets(reachable, starts, shares)
-    bound = lower_bound(reachable, starts, shares, loads)
+    wanted = loads * shares
+    bound = pocket_bound(reachable, starts, loads, shares)
     floor = cells_at_least(bound, shares)
 
-    tried = [balance(labels, cells, targets, width, lane, seed) for labels, (_, _, lane) in zip(grown, lanes, strict=True)]
-    worst = np.array([(np.bincount(labels[labels >= 0], minlength=k) / floor).max() for labels in tried])
+    rng = np.random.default_rng(seed)
+    tried = [balance(labels, cells, wanted, width, lane, rng) for labels, (_, _, lane) in zip(grown, lanes, strict=True)]
+    worst = np.array([_worst(labels, floor) for labels in tried])
+    if worst.min() > 1:
+        bound = max(bound, chamber_bound(reachable, starts, shares), key=lambda b: b.load)
+        floor = cells_at_least(bound, shares)
+        worst = np.array([_worst(labels, floor) for labels in tried])
+    if worst.min() > 1:
+        tried.append(rebalance(tried[worst.argmin()], cells, wanted, floor, width, rng))
+        worst = np.append(worst, _worst(tried[-1], floor))
     good = [labels for labels, load in zip(tried, worst, strict=True) if load <= worst.min() + 1e-9]
 
     def time(labels: np.ndarray) -> float:
         return _time(labels.reshape(padded.shape)[1:-1, 1:-1], shares, turn_cost)
 
-    rng = np.random.default_rng(seed)
     budget = min(max(LOOKS * int(reachable.sum()), LEAST_LOOKS), MOST_LOOKS)
     straight = min((recombine(labels, cells, width, rng, budget // 8) for labels in good), key=time)
     straight = min((straight, recombine(straight, cells, width, rng, budget // 2)), key=time)
     labels = np.ascontiguousarray(straight.reshape(padded.shape)[1:-1, 1:-1])
     sizes = np.bincount(labels[labels >= 0], minlength=k)
-    ratio = float((sizes / floor).max())
+    ratio = _worst(labels, floor)
     return Division(labels, sizes, targets, floor, bound.proof, ratio, _reasons(free, reachable, shares, sizes, targets))
 
 
@@ -125,6 +134,10 @@ def _in_free(free: np.ndarray, cells: np.ndarray) -> np.ndarray:
     inside = np.asarray(((cells >= 0) & (cells < free.shape)).all(axis=1))
     inside[inside] = free[cells[inside, 0], cells[inside, 1]]
     return inside
+
+
+def _worst(labels: np.ndarray, floor: np.ndarray) -> float:
+    return float((np.bincount(labels[labels >= 0], minlength=len(floor)) / floor).max())
 
 
 def _time(labels: np.ndarray, shares: np.ndarray, turn_cost: float | np.ndarray) -> float:

@@ -23,7 +23,7 @@ def instances(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return free, cells[rng.choice(len(cells), k, replace=False)], weights / weights.sum()
 
 
-@settings(deadline=None, max_examples=120)
+@settings(deadline=None, max_examples=60)
 @given(instances())
 def test_regions_are_connected_hold_their_starts_and_cover_what_is_reachable(instance: tuple) -> None:
     """Whatever the grid, starts and shares."""
@@ -45,7 +45,7 @@ def check(free: np.ndarray, starts: np.ndarray, division: Division) -> None:
     assert division.ratio >= 1.0
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=20)
 @given(st.integers(0, 2**32 - 1))
 def test_open_ground_gives_any_share_to_within_a_cell(seed: int) -> None:
     """On a 30 x 30 area without obstacles, starts apart from each other."""
