@@ -39,10 +39,22 @@ def read_scenario(source: str | Path) -> Scenario:
 
     Raises InputError with the first problem, in one line that names the feature, its place and what to do.
     """
+    return _scenario(source, None)
+
+
+def read_additions(source: str | Path, frame: Frame) -> Scenario:
+    """Return what a GeoJSON file adds to a mission, in metres of its `frame`: any roles, none required.
+
+    Raises InputError as `read_scenario` does.
+    """
+    return _scenario(source, frame)
+
+
+def _scenario(source: str | Path, frame: Frame | None) -> Scenario:
     data = read_bytes(source)
     name = "standard input" if str(source) == "-" else str(source)
     try:
-        scenario, problems = _read(data, _name(source))
+        scenario, problems = _read(data, _name(source), frame)
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
     if scenario is None:
@@ -64,19 +76,10 @@ def read_obstacles(source: str | Path, frame: Frame) -> tuple[Obstacle, ...]:
 
     Raises InputError as `read_scenario` does, and if there are none.
     """
-    name, problems = "standard input" if str(source) == "-" else str(source), list[str]()
-    try:
-        document = parse(read_bytes(source))
-        features = [f for i, raw in enumerate(document["features"]) if (f := _feature(i, raw, problems))]
-        features = [f for f in features if f["role"] == "obstacle"]
-        shapes = _shapes(features, frame, problems) if not problems else {}
-    except InputError as error:
-        raise InputError(f"{name}: {error}") from None
-    if not problems and not features:
-        problems.append('no feature has the role "obstacle"')
-    if problems:
-        raise InputError(f"{name}: {problems[0]}")
-    return tuple(Obstacle(*part) for f in features for part in _obstacle_parts(f, shapes[f["place"]]))
+    obstacles = read_additions(source, frame).site.obstacles
+    if not obstacles:
+        raise InputError(f'{source}: no feature has the role "obstacle"')
+    return obstacles
 
 
 def read_bytes(source: str | Path) -> bytes:
@@ -93,16 +96,17 @@ def _name(source: str | Path) -> str:
     return "site" if str(source) == "-" else Path(source).stem
 
 
-def _read(data: bytes, name: str) -> tuple[Scenario | None, list[str]]:
-    """Return the scenario, or None, and all problems found."""
+def _read(data: bytes, name: str, frame: Frame | None = None) -> tuple[Scenario | None, list[str]]:
+    """Return the scenario, or None, and all problems found; with a `frame` given, nothing in particular is required."""
     document = parse(data)
     problems: list[str] = []
     features = [f for i, raw in enumerate(document["features"]) if (f := _feature(i, raw, problems))]
-    if not any(f["role"] == "area" or f["role"] in ("task", "casualty") for f in features) and not problems:
+    required = ("area", "task", "casualty") if frame is None else tuple(GEOMETRIES)
+    if not any(f["role"] in required for f in features) and not problems:
         problems.append('no feature has the role "area" or "task"; give the polygon to be covered "role": "area"')
     if problems:
         return None, problems
-    frame = _frame(features, problems)
+    frame = frame or _frame(features, problems)
     if problems:
         return None, problems
     shapes = _shapes(features, frame, problems)

@@ -18,6 +18,7 @@ VERBS = {
     "export": "Autopilot and ECDIS files, recording, pictures.",
     "init": "A small site to start from.",
     "plan": "Cover an area.",
+    "replan": "From what has happened so far: losses, additions, withdrawals.",
     "reproduce": "A paper's tables beside ours.",
     "simulate": "Execute a plan in PyBullet; report and verdict.",
     "triage": "Search, relay, treat; the four methods.",

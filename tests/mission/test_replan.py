@@ -34,7 +34,7 @@ def lines(mission):
     return [t for v, r in zip(mission.vehicles, mission.routes, strict=True) for t in survey_tracks(v, r)]
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(st.floats(0, 2000))
 def test_no_change_is_the_same_plan_from_there_on(time):
     """Without changes each route is what was left of it: same waypoints, same times less what has passed."""
@@ -46,7 +46,7 @@ def test_no_change_is_the_same_plan_from_there_on(time):
         assert np.allclose([w.time for w in new.waypoints[1:]], [w.time - time for w in left])
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(st.sampled_from(["farm_survey", "west_ant_island"]), st.floats(0.05, 0.95), st.integers(1, 2), st.randoms())
 def test_losses_are_taken_over(site, part, count, random):
     """Whoever is lost and whenever: done and replanned tracks together cover what the plan covered, and all come home."""
