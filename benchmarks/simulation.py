@@ -109,7 +109,11 @@ def main() -> None:
     print("| " + " | ".join(name.replace("_", " ") for name in rows[0]) + " |")
     print("|" + "---|" * len(rows[0]))
     for row in rows:
-        print("| " + " | ".join(f"{value:,}" if isinstance(value, int | float) else value for value in row.values()) + " |")
+        print(
+            "| "
+            + " | ".join(f"{value:,}" if isinstance(value, int | float) else str(value or "") for value in row.values())
+            + " |"
+        )
 
 
 if __name__ == "__main__":

@@ -64,7 +64,7 @@ class Running:
         self.told = np.zeros(self.count, int)
         self.done = False
         self.slow = np.full(self.count, np.inf)
-        rooms = {v.domain: _prepared(self.mission.site.navigable(v.domain)) for v in vehicles}
+        rooms = {d: _prepared(self.mission.site.navigable(d)) for d in sorted({v.domain for v in vehicles})}
         self.room = [rooms[v.domain] for v in vehicles]
         self.ids = [v.id for v in vehicles]
         self.change, self.suffering = -1.0, active((), self.ids, 0.0)
