@@ -17,6 +17,7 @@ from quarterdeck.physics.relocate import anywhere, relocate
 
 BIN = (0.5, math.radians(10.0))  # m and radians: the KLD bins
 ALARM = 0.25  # lostness above which a filter had better be helped
+SEEN = 0.15  # of the beams must have an echo for the fit to count
 CLUSTER = (1.0, 0.5)  # m and radians: so far around the best place particles belong to it
 
 
@@ -26,7 +27,7 @@ class FilterParams:
     used of a scan. Motion: `along`, `across` m of deviation after a metre, `drift` radians after a metre, `turn` after a
     radian turned, `gyro` after a second. Particles: from `least` to `most` by KLD sampling with error `error` at normal
     quantile `quantile`. `slow` and `fast` are the rates of the averages whose ratio tells that the filter is lost; `weak`
-    metres is the deviation of the least certain direction above which a scan alone says too little.
+    metres is the deviation of the least certain direction above which a scan, or a belief, is worth too little.
     """
 
     hit: float = 0.1
@@ -127,6 +128,8 @@ def weigh_scan(
         params.hit,
         params.random_part,
     )
+    if np.count_nonzero(np.isfinite(ranges[use])) < SEEN * len(use):  # too little to tell whether it is lost
+        return Belief(belief.particles, _reweighed(belief.weights, told), belief.slow, belief.fast)
     mean = float(belief.weights @ fit)
     slow = belief.slow + params.slow * (mean - belief.slow) if belief.slow else mean
     fast = belief.fast + params.fast * (mean - belief.fast) if belief.fast else mean

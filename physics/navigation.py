@@ -10,6 +10,7 @@ import numpy as np
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.physics.amcl import (
     ALARM,
+    Belief,
     FilterParams,
     believe_at,
     estimate,
@@ -42,6 +43,7 @@ from quarterdeck.physics.positioning import (
 KNOWN, LIDAR, BY_GNSS, DEAD = range(4)
 MODES = ("known", "lidar", "gnss", "dead reckoning")
 PERIOD = 0.5  # s between updates of the particle filters
+REST = 5.0  # s from one recovery to the next: the filter needs some scans to tell the places apart
 BRIDGE = 5.0  # s that odometry bridges before GNSS takes over where the lidar sees too little
 LAUNCHED = (0.1, 0.1, 0.05)  # m, m, radians: how well a robot knows where it was put down
 
@@ -88,6 +90,7 @@ class Navigation:
         self.beliefs = [believe_at(pose[i], LAUNCHED, self.params, random) for i in self.lidar]
         self.pending = np.zeros((len(self.lidar), 3))  # pose change since the last update, in the frame of the pose then
         self.weak = np.zeros(len(self.lidar))  # seconds for which the lidar has seen too little
+        self.rest = np.zeros(len(self.lidar))  # seconds until a recovery may be tried again
         self.recoveries = np.zeros(count, int)
         self.mode[self.lidar] = LIDAR
         self.by_fixes = np.setdiff1d(np.arange(count), self.lidar)
@@ -147,8 +150,7 @@ class Navigation:
 
     def _localise(self, deaf: np.ndarray, fix: bool, angles: np.ndarray, ranges: np.ndarray) -> None:
         """Update the particle filters."""
-        assert self.map is not None
-        p, field, grid = self.params, self.map.field, self.map.grid
+        p = self.params
         places = fixes(self.truth[self.lidar], self.slow[self.lidar], self.receiver, self.random)
         for n, i in enumerate(self.lidar):
             way = math.hypot(*self.pending[n, :2])
@@ -158,23 +160,57 @@ class Navigation:
             motion = body_motion(np.zeros((1, 3)), self.pending[n : n + 1])[0]
             belief = move(belief, motion, PERIOD, p, self.random)
             self.pending[n] = 0.0
-            if weakest(self.believed[i], field, angles, ranges[n], p) <= p.weak:
-                self.weak[n] = 0.0
-                belief = weigh_scan(belief, field, angles, ranges[n], p)
-                doubt = 6 * math.hypot(self.receiver.white, self.receiver.slow)
-                astray = not deaf[i] and math.hypot(*(self.believed[i, :2] - places[n])) > doubt
-                part = 0.9 if astray else lostness(belief)
-                if part > ALARM:
-                    self.recoveries[i] += 1
-                    around = None if deaf[i] else (places[n], doubt)
-                    belief = recover(belief, part, field, grid, angles, ranges[n], REACH, p, self.random, around)
-            else:
-                self.weak[n] += PERIOD
-                if self.weak[n] > BRIDGE and fix and not deaf[i]:
-                    belief = weigh_fix(belief, places[n], math.hypot(self.receiver.white, self.receiver.slow))
-            self.mode[i] = LIDAR if self.weak[n] <= BRIDGE else DEAD if deaf[i] else BY_GNSS
-            self.beliefs[n] = resample(belief, p, self.random)
+            self.beliefs[n] = resample(
+                self._told(n, i, belief, angles, ranges[n], places[n], fix, not deaf[i]), p, self.random
+            )
             self.believed[i] = estimate(self.beliefs[n]).pose
+
+    def _told(
+        self,
+        n: int,
+        i: int,
+        belief: Belief,
+        angles: np.ndarray,
+        ranges: np.ndarray,
+        place: np.ndarray,
+        fix: bool,
+        hears: bool,
+    ) -> Belief:
+        """Return what robot `i` believes after a scan and, where that does not hold it, a position fix.
+
+        It lives by its lidar as long as the belief stays sharp, whatever a single scan tells; when it has not for BRIDGE
+        seconds, by GNSS, until a scan alone tells enough: then it looks for where it fits around where it should be.
+        """
+        assert self.map is not None
+        p, site, doubt = self.params, self.map, max(6 * math.hypot(self.receiver.white, self.receiver.slow), 2.0)
+        holds = self.mode[i] == LIDAR
+        if not holds and weakest(self.believed[i], site.field, angles, ranges, p) <= p.weak:
+            holds, self.weak[n] = True, 0.0
+            belief = Belief(belief.particles, belief.weights)
+            wide = max(doubt, 3 * _spread(belief))
+            around = (place if hears else self.believed[i, :2], wide)
+            belief = recover(belief, 0.9, site.field, site.grid, angles, ranges, REACH, p, self.random, around)
+        if holds:
+            belief = weigh_scan(belief, site.field, angles, ranges, p)
+            astray = hears and math.hypot(*(self.believed[i, :2] - place)) > doubt
+            part = 0.9 if astray else lostness(belief)
+            self.rest[n] = max(self.rest[n] - PERIOD, 0.0)
+            if part > ALARM and self.rest[n] == 0:
+                self.recoveries[i] += 1
+                self.rest[n] = REST
+                near = (place, doubt) if hears else None
+                belief = recover(belief, part, site.field, site.grid, angles, ranges, REACH, p, self.random, near)
+            self.weak[n] = self.weak[n] + PERIOD if _spread(belief) > p.weak else 0.0
+            holds = self.weak[n] <= BRIDGE
+        elif hears and fix:
+            belief = weigh_fix(belief, place, math.hypot(self.receiver.white, self.receiver.slow))
+        self.mode[i] = LIDAR if holds else BY_GNSS if hears else DEAD
+        return belief
+
+
+def _spread(belief: Belief) -> float:
+    """Return metres: the deviation of the belief's position in its least certain direction."""
+    return math.sqrt(max(float(np.linalg.eigvalsh(estimate(belief).covariance[:2, :2])[-1]), 0.0))
 
 
 REACH = 30.0  # m: of the lidars
