@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
 from quarterdeck.geo.scenario import Vehicle
+from quarterdeck.mission.guard_check import unproved
 from quarterdeck.mission.mission import Mission, Route, Waypoint
 from quarterdeck.mission.timing import shortfalls
 
@@ -22,8 +23,8 @@ def check_mission(mission: Mission) -> tuple[str, ...]:
     """Return every problem found, a line each: none means that the plan can be driven as it is.
 
     Checked are: numbers and order of times; staying in the operating area; clear of obstacles by each vehicle's clearance
-    (its berth apart); survey legs in the areas; vehicles apart in time; energy and endurance with the reserve; and what
-    the planner itself found.
+    (its berth apart); survey legs in the areas; vehicles apart in time; energy and endurance with the reserve; a guards
+    plan's coverage, by another way than it was planned; and what the planner itself found.
     """
     broken = unsound(mission)
     if broken:
@@ -31,6 +32,7 @@ def check_mission(mission: Mission) -> tuple[str, ...]:
     problems = [*mission.reasons, *trespasses(mission), *_too_near(mission), *_astray(mission), *_meetings(mission)]
     for route in mission.routes:
         problems += shortfalls(mission.vehicle(route.vehicle), route)
+    problems += unproved(mission)
     return tuple(dict.fromkeys(problems))
 
 

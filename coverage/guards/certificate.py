@@ -79,8 +79,10 @@ def _places(region: shapely.Geometry, piece: shapely.Polygon) -> np.ndarray:
     return np.array(places)
 
 
-def uncovered_by_shadows(target: MultiPolygon, sight: MultiPolygon, guards: np.ndarray, ranges: np.ndarray) -> float:
-    """Return the square metres of the target that (k, 2) guards with (k,) ranges do not see, without any triangulation."""
+def uncovered_by_shadows(
+    target: MultiPolygon, sight: MultiPolygon, guards: np.ndarray, ranges: np.ndarray
+) -> MultiPolygon:
+    """Return what of the target (k, 2) guards with (k,) ranges do not see, without any triangulation."""
     rings = [r for p in sight.geoms for r in (p.exterior, *p.interiors)]
     corners = [shapely.get_coordinates(r) for r in rings]
     walls = np.concatenate([np.stack([c[:-1], c[1:]], axis=1) for c in corners])
@@ -91,7 +93,7 @@ def uncovered_by_shadows(target: MultiPolygon, sight: MultiPolygon, guards: np.n
         disc = shapely.Polygon(guard + reach * np.column_stack([np.cos(angle), np.sin(angle)]))
         near = tree.query(shapely.Point(guard), predicate="dwithin", distance=reach)
         views.append(disc.difference(shapely.union_all(_shadows(guard, walls[np.sort(near)], reach))))
-    return float(target.difference(shapely.union_all(views)).area)
+    return as_multipolygon(target.difference(shapely.union_all(views)))
 
 
 def _shadows(guard: np.ndarray, walls: np.ndarray, reach: float) -> np.ndarray:

@@ -71,7 +71,7 @@ def test_two_of_three_are_lost_one_after_the_other_and_all_is_seen(plan: tuple[S
     parts = [confirmed(m, s) for m, s in ((mission, served), (second, again), (third, final.served))]
     places, ranges = np.concatenate([p for p, _ in parts]), np.concatenate([r for _, r in parts])
     area = given.site.coverable
-    assert uncovered_by_shadows(area, given.site.navigable("ground"), places, ranges) < 3e-9 * area.area
+    assert uncovered_by_shadows(area, given.site.navigable("ground"), places, ranges).area < 3e-9 * area.area
     assert third.routes[0].xyz[-1, :2] == pytest.approx(np.array(mission.vehicle("b").home))
 
 
@@ -107,7 +107,7 @@ def test_a_new_obstacle_gets_new_guards_and_nothing_left_needs_none(plan: tuple[
     assert after.feasible
     guards, ranges = confirmed(after, frozenset(f"guard-{i}" for i in range(200)))
     area = changed.site.coverable
-    assert uncovered_by_shadows(area, changed.site.navigable("ground"), guards, ranges) < 2e-9 * area.area
+    assert uncovered_by_shadows(area, changed.site.navigable("ground"), guards, ranges).area < 2e-9 * area.area
     working, served = moved(mission, mission.figures["duration"] + 1, {})
     done = guards_from_now(mission, replace(given, vehicles=working), served)
     assert done.figures["guards"] == 0

@@ -37,7 +37,7 @@ def test_everything_is_seen_and_every_guard_is_passed_once(mode: str, clearance:
     guards = shapely.get_coordinates(layer.geometries)
     ranges = np.array([p["range"] for p in layer.properties])
     site = given.site
-    assert uncovered_by_shadows(site.coverable, site.navigable("ground"), guards, ranges) < 1e-9 * site.coverable.area
+    assert uncovered_by_shadows(site.coverable, site.navigable("ground"), guards, ranges).area < 1e-9 * site.coverable.area
     stops = [w for route in mission.routes for w in route.waypoints if w.task]
     assert sorted(w.task for w in stops) == sorted(f"guard-{i}" for i in range(len(guards)))
     assert all(np.allclose([w.x, w.y], guards[int(w.task.removeprefix("guard-"))], atol=1e-6) for w in stops)
@@ -87,7 +87,7 @@ def test_a_part_of_higher_priority_is_seen_first() -> None:
             next(
                 at[n - 1, 0]
                 for n in range(1, len(at) + 1)
-                if uncovered_by_shadows(part, walls, at[:n, 1:], np.full(n, 12.0)) < 1e-9 * part.area
+                if uncovered_by_shadows(part, walls, at[:n, 1:], np.full(n, 12.0)).area < 1e-9 * part.area
             )
         )
 
@@ -109,7 +109,7 @@ def test_a_robot_of_longer_range_leaves_guards_out() -> None:
     assert set(ranges) == {12.0, 30.0}
     site = given.site
     guards = shapely.get_coordinates(layer.geometries)[passed]
-    assert uncovered_by_shadows(site.coverable, site.navigable("ground"), guards, ranges) < 1e-9 * site.coverable.area
+    assert uncovered_by_shadows(site.coverable, site.navigable("ground"), guards, ranges).area < 1e-9 * site.coverable.area
 
 
 @pytest.mark.parametrize(
