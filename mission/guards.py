@@ -22,6 +22,7 @@ from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.timing import shortfalls
 
 Mode = Literal["optimised", "paper"]
+MOST_GUARDS = 400  # by area alone: the tours past them are searched over all distances between them
 METHOD = "target less the union of range-limited visibility polygons, discs inscribed"
 
 
@@ -48,6 +49,11 @@ def plan_guards(
     if inspect == "border":
         space = replace(space, target=border_of(space.target))
     reach = float(ranges.min())
+    if (least := space.target.area / (np.pi * reach**2)) > MOST_GUARDS:
+        raise InputError(
+            f"a range of {reach:g} m over {space.target.area:.4g} m2 takes at least {least:,.0f} guards; "
+            f"up to {MOST_GUARDS:,} are planned: give a longer range, a smaller area, or sweep it with --method stc"
+        )
     mesh = triangulate(space.sight)
     guards, unseen = mend(space, mesh, paper_guards(space, reach), reach)
     seeable = space if unseen.is_empty else replace(space, target=as_multipolygon(space.target.difference(unseen)))

@@ -79,9 +79,7 @@ def _places(region: shapely.Geometry, piece: shapely.Polygon) -> np.ndarray:
     return np.array(places)
 
 
-def uncovered_by_shadows(
-    target: MultiPolygon, sight: MultiPolygon, guards: np.ndarray, ranges: np.ndarray
-) -> MultiPolygon:
+def uncovered_by_shadows(target: MultiPolygon, sight: MultiPolygon, guards: np.ndarray, ranges: np.ndarray) -> MultiPolygon:
     """Return what of the target (k, 2) guards with (k,) ranges do not see, without any triangulation."""
     rings = [r for p in sight.geoms for r in (p.exterior, *p.interiors)]
     corners = [shapely.get_coordinates(r) for r in rings]

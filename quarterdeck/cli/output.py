@@ -50,6 +50,13 @@ def print_figures(mission: Mission) -> None:
     screen.print(
         "; ".join(f"{label} {form.format(mission.figures[n] * factor)}" for n, (label, form, factor) in known.items())
     )
+    if paper := mission.figures.get("paper"):
+        least, bound = mission.bounds["guards"], mission.bounds["makespan"]
+        unseen = mission.figures["certificate"]["uncovered"]
+        screen.print(f"at least {least} guards and {bound:,.0f} s; unseen {unseen:.3g} m2")
+        screen.print(
+            f"as the paper: {paper['guards']} guards, {paper['makespan']:,.0f} s (at least {paper['bound']:,.0f} s)"
+        )
     for reason in mission.reasons:
         screen.print(f"[bold]infeasible:[/] {reason}", soft_wrap=True)
 
@@ -63,7 +70,9 @@ WORDS = {
     "turns": ("turns", "{:,.0f}", 1.0),
     "length": ("survey length", "{:.2f} km", 0.001),
     "overlap": ("overlap", "{:.1f} %", 100.0),
+    "guards": ("guards", "{:,.0f}", 1.0),
     "makespan": ("makespan", "{:,.0f} s", 1.0),
+    "ratio": ("over its bound", "{:.2f}", 1.0),
     "energy": ("energy", "{:,.0f} Wh", 1.0),
 }
 

@@ -9,6 +9,7 @@ from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.models import load_model
 from quarterdeck.geo.scenario import Area, Obstacle, Scenario, Site, Vehicle, as_multipolygon
+from quarterdeck.mission.guard_check import unproved
 from quarterdeck.mission.guards import plan_guards
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.planfile import plan_text
@@ -121,6 +122,7 @@ def test_a_robot_of_longer_range_leaves_guards_out() -> None:
         ([(1, 1)], float("nan"), "range nan must be positive"),
         ([(1, 1)], None, "vehicle 'r0' has no range"),
         ([], 5.0, "there is no vehicle"),
+        ([(1, 1)], 0.5, "takes at least 2,"),
     ],
 )
 def test_wrong_input_is_told_in_a_line(starts: list[tuple[float, float]], reach: float | None, text: str) -> None:
@@ -150,3 +152,15 @@ def test_what_cannot_be_seen_is_told() -> None:
     unseen = float(mission.reasons[0].split(" m2 cannot be seen")[0])
     assert 8.0 < unseen < 10.5
     assert mission.figures["certificate"]["uncovered"] == pytest.approx(unseen, rel=0.05)
+
+
+def test_a_plan_that_skips_a_guard_does_not_pass_the_check() -> None:
+    """The check finds, from the PLAN's text alone, that all is seen; and what is not when a stop is left out."""
+    mission = plan_guards(scenario((1, 1), (59, 39)), range=12.0)
+    assert unproved(mission) == []
+    route = mission.routes[0]
+    stop = next(w for w in route.waypoints if w.task)
+    short = replace(route, waypoints=tuple(w for w in route.waypoints if w is not stop))
+    problems = unproved(replace(mission, routes=(short, *mission.routes[1:])))
+    assert problems[0] == f"r0: does not pass {stop.task}"
+    assert "m2 are in no guard's view" in problems[1]
