@@ -24,6 +24,7 @@ FORMATS: dict[str, tuple[str, dict[str, Any], str]] = {
     "csv": ("waypoint_table", {}, "every waypoint, a row each"),
     "geojson": ("geojson", {}, "styled routes and site for geojson.io, GitHub, QGIS"),
     "gpx": ("gpx", {}, "routes for chart plotters, OpenCPN, receivers"),
+    "html": ("page", {}, "a page that pans, zooms and plays without a network"),
     "kml": ("kml", {}, "routes and site for Google Earth"),
     "kmz": ("kml", {"packed": True}, "the same, zipped"),
     "moos": ("moos", {}, "MOOS-IvP behaviours"),
