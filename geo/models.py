@@ -94,6 +94,11 @@ def _model(document: dict[str, Any]) -> VehicleModel:
         if not isinstance(document.get(table), dict):
             raise InputError(f"table [{table}] is missing")
     limits, energy = document["limits"], document["energy"]
+    for table, known in (("limits", (*_LIMITS, "climb_rate", "altitude")), ("energy", _ENERGY)):
+        for key in document[table]:
+            if key not in known:
+                near = get_close_matches(key, known, n=1)
+                raise InputError(f"[{table}] has no {key!r}; {f'did you mean {near[0]!r}?' if near else ', '.join(known)}")
     figures = {key: _number(limits, "limits", key) for key in _LIMITS}
     figures |= {key: _number(limits, "limits", key) for key in ("climb_rate", "altitude") if key in limits}
     figures |= {key: _number(energy, "energy", key) for key in _ENERGY}
