@@ -1,9 +1,10 @@
-"""Write what is generated: docs/geojson.md and geo/site.schema.json, both from geo/properties.py. `make docs` runs it."""
+"""Write what is generated, `make docs` runs it: docs/geojson.md, docs/triage-machines.md and geo/site.schema.json."""
 
 import json
 from pathlib import Path
 
 from quarterdeck.geo.properties import GEOMETRIES, PROPERTIES, json_schema
+from quarterdeck.mission.triage.machines import MACHINES, as_markdown
 
 ROOT = Path(__file__).parents[1]
 
@@ -65,6 +66,13 @@ def geojson_page() -> str:
     return "\n".join(lines) + "\n"
 
 
+def machines_page() -> str:
+    """Return docs/triage-machines.md."""
+    head = "# The state machines of triage\n"
+    made = "Made by `make docs` from `mission/triage/machines.py`, which the director runs.\n"
+    return "\n".join([head, made, *(as_markdown(kind) for kind in MACHINES)])
+
+
 def schema_text() -> str:
     """Return geo/site.schema.json."""
     return json.dumps(json_schema(), indent=1) + "\n"
@@ -72,4 +80,5 @@ def schema_text() -> str:
 
 if __name__ == "__main__":
     (ROOT / "docs" / "geojson.md").write_text(geojson_page(), encoding="utf-8")
+    (ROOT / "docs" / "triage-machines.md").write_text(machines_page(), encoding="utf-8")
     (ROOT / "geo" / "site.schema.json").write_text(schema_text(), encoding="utf-8")

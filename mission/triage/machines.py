@@ -79,6 +79,7 @@ MEDIC = (
 )
 
 MACHINES: Mapping[str, tuple[Row, ...]] = MappingProxyType({"ugv": UGV, "uav": UAV, "medic": MEDIC})
+START = {"ugv": "explore", "uav": "return", "medic": "idle"}
 TITLES = {"ugv": "UGV (Fig. 3)", "uav": "UAV (Fig. 4)", "medic": "Medic (Fig. 5)"}
 _LOOKUP = {kind: {(r.state, r.event): r for r in rows} for kind, rows in MACHINES.items()}
 
@@ -89,12 +90,13 @@ def step(kind: str, state: str, event: str) -> Row | None:
 
 
 def as_markdown(kind: str) -> str:
-    """Return a machine as a Mermaid state diagram, which GitHub draws, and its table below."""
+    """Return a machine as a Mermaid state diagram, which GitHub draws, of the figure's rows, and the table of all rows."""
     rows = MACHINES[kind]
-    key = {s: s.replace(" ", "_") for row in rows for s in (row.state, row.next)}
-    lines = [f"### {TITLES[kind]}", "", "```mermaid", "stateDiagram-v2", f"    [*] --> {key[rows[0].state]}"]
+    drawn = [r for r in rows if not r.extra]
+    key = {s: s.replace(" ", "_") for r in drawn for s in (r.state, r.next)}
+    lines = [f"## {TITLES[kind]}", "", "```mermaid", "stateDiagram-v2", f"    [*] --> {key[START[kind]]}"]
     lines += [f'    state "{s}" as {k}' for s, k in key.items() if s != k]
-    lines += [f"    {key[r.state]} --> {key[r.next]}: {r.event} / {r.action}" for r in rows]
+    lines += [f"    {key[r.state]} --> {key[r.next]}: {r.event} / {r.action}" for r in drawn]
     lines += ["```", "", "| state | event | action | next | in the figure |", "|---|---|---|---|---|"]
     lines += [f"| {r.state} | {r.event} | {r.action} | {r.next} | {'no' if r.extra else 'yes'} |" for r in rows]
     return "\n".join(lines) + "\n"

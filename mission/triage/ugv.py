@@ -173,7 +173,11 @@ def _report(desk: Desk, name: str) -> None:
     me: Ugv = desk.agents[name]
     desk.change(name, around=(), gathered=0, sweeps=0)
     if desk.policy.receiver == "medic" or me.relay_lost:
-        if me.unreachable >= set(desk.team.medics):
+        must_look = me.relay_lost or not desk.settings.knows_medic
+        if me.searched and must_look and not me.reports and not desk.policy.everywhere:
+            desk.fire(name, "receipt in hand")  # an empty list is not worth a search for a medic
+            desk.send(name, ())
+        elif me.unreachable >= set(desk.team.medics):
             _give_up(desk, name)
         else:
             _look_for_medic(desk, name)

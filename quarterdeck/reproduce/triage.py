@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from quarterdeck.mission.triage.outcome import Outcome
+    from quarterdeck.mission.triage.study import Variant
 
     Results = dict[str, dict[str, np.ndarray]]
 
@@ -45,8 +46,8 @@ ASSUMPTIONS = """\
 Assumed where the paper is silent: lanes 2.5 m (Table I implies 2.4: constant communication's 550 m for 1333 m2), UGV 2.5,
 UAV 8, medic 1.4 m/s, treatment 10 s, UGVs and medics see 3 m, communication 2 m, 8 to 14 casualties evenly scattered,
 each colour as likely; UGVs start on the southern edge, UAV and medic at (40, 25). A mission's time ends with the last
-treatment or the end of the last search. At the end of its section a UGV reports in every method, with an empty list too,
-and waits for the receipt of what the UAV took.
+treatment or the end of the last search. At the end of its section a UGV reports in every method, with an empty list too
+unless it would have to look for the medic, and waits for the receipt of what the UAV took.
 "No relay": the UGVs know where the medic is; "must look": no relay, and only where he was, and his queue, when last met."""
 DIFFERS = """\
 Differs from Table I: relay is not the fastest; constant communication is, which has strictly more information. No priority
@@ -63,9 +64,10 @@ claimed: against UGVs who know where the medic is, it does not; against UGVs who
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="The first seed; the others follow.")
 @click.option("--jobs", type=click.IntRange(min=1), default=os.cpu_count() or 1, help="Processes; default one a core.")
 @click.option("--figures", metavar="FOLDER", help="Draw Figs 6 to 9 into a folder.")
+@click.option("--ideas", is_flag=True, help="Compare team sizes and the ideas that the paper only names, instead.")
 @click.option("--json", "as_json", is_flag=True, help="Print every figure's mean and interval, and the claims, as JSON.")
 @click.option("--force", is_flag=True, help="Overwrite existing files.")
-def command(cases: int, seed: int, jobs: int, figures: str | None, as_json: bool, force: bool) -> int:
+def command(cases: int, seed: int, jobs: int, figures: str | None, ideas: bool, as_json: bool, force: bool) -> int:
     """Run all methods on the same seeded cases and print Table I beside ours, with 95 % intervals.
 
     Exit status 1 if a claim does not hold on these cases.
@@ -77,17 +79,24 @@ def command(cases: int, seed: int, jobs: int, figures: str | None, as_json: bool
     from quarterdeck.mission.triage.settings import Settings
     from quarterdeck.mission.triage.study import Variant, run_study
 
-    variants = {
-        "relay": Variant("relay"),
-        "no relay": Variant("no-relay"),
-        "must look": Variant("no-relay", Settings(knows_medic=False)),
-        "no priority": Variant("no-priority"),
-        "constant": Variant("constant"),
-    }
+    variants = (
+        idea_variants()
+        if ideas
+        else {
+            "relay": Variant("relay"),
+            "no relay": Variant("no-relay"),
+            "must look": Variant("no-relay", Settings(knows_medic=False)),
+            "no priority": Variant("no-priority"),
+            "constant": Variant("constant"),
+        }
+    )
     screen = Console(width=124, highlight=False)
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("cases", total=cases * len(variants))
         results = run_study(variants, range(seed, seed + cases), jobs=jobs, progress=lambda n: bar.advance(task, n))
+    if ideas:
+        _print_ideas(screen, results, cases) if not as_json else click.echo(json.dumps(_intervals(results), indent=2))
+        return 0
     claims = check_claims(results)
     if as_json:
         click.echo(json.dumps({"cases": cases, "seed": seed, "figures": _intervals(results), "claims": claims}, indent=2))
@@ -97,6 +106,30 @@ def command(cases: int, seed: int, jobs: int, figures: str | None, as_json: bool
         for name, picture in draw().items():
             click.echo(f"wrote {write_file(Path(figures) / name, picture, force=force)}", err=True)
     return 0 if all(c["holds"] for c in claims) else 1
+
+
+def idea_variants() -> dict[str, Variant]:
+    """Return the relay with other teams, and with the ideas that the paper names and leaves for later."""
+    from quarterdeck.mission.triage.settings import Settings
+    from quarterdeck.mission.triage.study import Variant
+
+    teams = {f"{n} UGV{'s' * (n > 1)}": Variant(ugvs=n) for n in (1, 2, 4, 5, 6)}
+    return {
+        "3 UGVs, 1 UAV, 1 medic": Variant(),
+        **teams,
+        "2 UAVs": Variant(uavs=2),
+        "2 medics": Variant(medics=2),
+        "3 medics": Variant(medics=3),
+        "moving rendezvous": Variant(settings=Settings(rendezvous="moving")),
+        "round robin": Variant(settings=Settings(rendezvous="round-robin")),
+        "report each red (N = 1)": Variant(settings=Settings(clusters=1)),
+        "2 helpers": Variant(settings=Settings(helpers=2)),
+        "tiring, 10 % in 100 m": Variant(settings=Settings(fatigue=0.1)),
+        "nearest first": Variant(settings=Settings(order="nearest")),
+        "first come": Variant(settings=Settings(order="first-come")),
+        "1 in 5 sorted wrongly": Variant(settings=Settings(confidence=0.8)),
+        "off by 2 m (1 sigma)": Variant(settings=Settings(position_error=2.0)),
+    }
 
 
 def check_claims(results: Results) -> list[dict[str, Any]]:
@@ -231,6 +264,29 @@ def _print(screen: Console, results: Results, claims: list[dict[str, Any]], case
         verdict = "holds" if c["shown"] else "holds here, not shown" if c["holds"] else "DOES NOT HOLD"
         screen.print(f"{verdict}: {c['claim']}: {middle} {unit} ({low} to {high})", soft_wrap=True)
     screen.print(ASSUMPTIONS, DIFFERS, sep="\n", soft_wrap=True)
+
+
+def _print_ideas(screen: Console, results: Results, cases: int) -> None:
+    """Print each variant's figures and, pair by pair, how they differ from the first's."""
+    from rich.table import Table
+
+    from quarterdeck.mission.triage.study import difference, mean_interval
+
+    columns = {k: RESPONDERS[k] for k in ("red_wait", "value_weighted_wait")} | {
+        k: PAPERS_FOUR[k] for k in ("time", "score", "ugv_distance")
+    }
+    base, *others = results
+    table = Table(
+        title=f"{base}, and what changes with other teams and ideas: {cases} paired cases, 95 %", title_justify="left"
+    )
+    table.add_column("relay with", no_wrap=True)
+    for label in columns.values():
+        table.add_column(label, justify="right", no_wrap=True)
+    table.add_row(base, *(_cell(*mean_interval(results[base][k])) for k in columns))
+    for name in others:
+        gaps = (difference(results[name][k], results[base][k]) for k in columns)
+        table.add_row(name, *(f"{m:+,.0f}\n({low:+,.0f} to {high:+,.0f})" for m, low, high in gaps))
+    screen.print(table)
 
 
 def _cell(mean: float, low: float, high: float) -> str:

@@ -1,6 +1,7 @@
 """Properties of triage missions: nobody lost, nobody twice, no word out of range, the plan always the priority TSP's."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from quarterdeck.mission.priority_tsp import priority_order
 from quarterdeck.mission.triage import outcome as outcome_module
 from quarterdeck.mission.triage.director import triage
 from quarterdeck.mission.triage.generate import generate, paper_team
-from quarterdeck.mission.triage.machines import MACHINES, as_markdown
+from quarterdeck.mission.triage.machines import MACHINES, START, as_markdown
 from quarterdeck.mission.triage.outcome import Outcome, run_triage, track_at
 from quarterdeck.mission.triage.records import Medic
 from quarterdeck.mission.triage.settings import METHODS, RANK, Settings
@@ -185,8 +186,10 @@ def test_each_machine_is_connected_and_deterministic(kind: str) -> None:
     """One row for a state and event, every state reachable from the first, and drawn with all its rows."""
     rows = MACHINES[kind]
     assert len({(r.state, r.event) for r in rows}) == len(rows)
-    reached = {"return"} if kind == "uav" else {rows[0].state}
+    reached = {START[kind]}
     for _ in rows:
         reached |= {r.next for r in rows if r.state in reached}
     assert reached == {s for r in rows for s in (r.state, r.next)}
-    assert as_markdown(kind).count("-->") == len(rows) + 1
+    drawn = as_markdown(kind)
+    assert drawn.count("-->") == sum(not r.extra for r in rows) + 1
+    assert drawn in (Path(__file__).parents[3] / "docs" / "triage-machines.md").read_text(encoding="utf-8"), "run make docs"
