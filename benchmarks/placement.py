@@ -4,7 +4,7 @@
     python benchmarks/placement.py ../shared/data/regions/*.geojson
 
 A region is a site, or a single GeoJSON Feature or geometry with a Polygon. One vehicle covers all of it; a part that the
-others do not touch gets a tour of its own. Seconds: the median of 5 warm runs of the placement.
+others do not touch gets a tour of its own. Seconds are of CPU: the median of 5 warm runs of the placement.
 """
 
 import json
@@ -121,9 +121,9 @@ def read_region(path: Path) -> tuple[MultiPolygon, dict[str, Any]]:
 
 
 def _timed(call: Any) -> tuple[Any, float]:
-    start = time.perf_counter()
+    start = time.process_time()
     result = call()
-    return result, time.perf_counter() - start
+    return result, time.process_time() - start
 
 
 def _exhaustive(area: MultiPolygon, spacing: float) -> float:

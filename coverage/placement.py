@@ -221,12 +221,13 @@ def _refine(
         current, size = index(edges, target, state)[0], 1.0
         for dx, dy, turn in rng.normal(0.0, (0.3, 0.3, 0.06), (TRIES, 3)):
             x, y, angle = _wrapped(state[0] + size * dx, state[1] + size * dy, state[2] + size * turn, fixed)
-            near = [(x, y, angle)]
-            near += [(float(v), y, angle) for v in best_shifts(edges, y, angle, 2)]
-            x = max(near, key=lambda s: index(edges, target, s)[0])[0]
-            near += [(x, float(v), angle) for v in best_shifts(edges, -x % 2.0, angle + math.pi / 2, 2)]
-            new, new_state = max((index(edges, target, s)[0], s) for s in near)
-            tried += len(near)
+            near = [(x, y, angle), *((float(v), y, angle) for v in best_shifts(edges, y, angle, 2))]
+            tries = [(index(edges, target, s)[0], s) for s in near]
+            x = max(tries)[1][0]
+            near = [(x, float(v), angle) for v in best_shifts(edges, -x % 2.0, angle + math.pi / 2, 2)]
+            tries += [(index(edges, target, s)[0], s) for s in near]
+            new, new_state = max(tries)
+            tried += len(tries)
             if new >= current:
                 state, current = new_state, new
             else:
