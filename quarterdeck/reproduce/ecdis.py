@@ -160,7 +160,7 @@ NOTES = {
   4.48 km is 112 cells of 40 m, 91.4 % of 196,000 m2; ours holds at least as many.
 Does not follow: F2 and F3 need not add coverage. The paper's three optimised rows have one length and differ in POC, which
   112 cells with their four centres inside cannot; most likely its nodes were counted by their centre while their cells
-  stuck out. The hypervertices of F1 alone are the most that fit; F2 and F3 only choose among placements near that.
+  stuck out. F1 alone holds as many hypervertices; F2 and F3 only choose among placements near that.
 "As printed" accepts like a minimiser and returns the last state it accepted, so it is little better than chance.""",
     "2": """Follows the paper: coverage hardly depends on the number of vehicles; turns rise with it.
 Does not follow: its 33 km at 100 m between tracks cover 3.3 km2, not 97 % of 20 km2, which takes about 195 km. Its time
