@@ -5,7 +5,7 @@ writes nothing. So an export is whole or not at all: every file is made and ever
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
@@ -15,6 +15,8 @@ from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.files import write_file
 from quarterdeck.mission.check import trespasses, unsound
 from quarterdeck.mission.mission import Mission
+from quarterdeck.mission.sorties import sorties
+from quarterdeck.mission.timing import shortfalls
 
 Autopilot = Literal["ardupilot", "px4"]
 AUTOPILOTS: tuple[Autopilot, ...] = ("ardupilot", "px4")
@@ -53,14 +55,16 @@ def export(
     out: str | Path,
     *,
     autopilot: str = "ardupilot",
+    split: bool = False,
     force: bool = False,
     tell: Callable[[str], None] | None = None,
 ) -> list[Path]:
     """Write `mission` in each of the formats `to` (names of `FORMATS`) into the folder `out`; return the files' paths.
 
-    `tell` is called with one line for each limit that the mission meets in a format. Raises InputError, and writes nothing,
-    for a plan that leaves the operating area or crosses a no-go zone, an unknown format or autopilot, two formats that
-    would write the same file, and where a file stands already and not `force`.
+    With `split` a mission beyond a vehicle's endurance is written as sorties (`mission.sorties`), each round into a folder
+    `sortie-1`, `sortie-2` and on. `tell` is called with one line for each limit that the mission meets in a format. Raises
+    InputError, and writes nothing, for a plan that leaves the operating area or crosses a no-go zone, an unknown format or
+    autopilot, two formats that would write the same file, and where a file stands already and not `force`.
     """
     names = [to] if isinstance(to, str) else list(to)
     if autopilot not in AUTOPILOTS:
@@ -71,18 +75,33 @@ def export(
         more = f" (and {len(problems) - 1} more: `quarterdeck check` lists them)" if len(problems) > 1 else ""
         raise InputError(f"the plan must not leave like this: {problems[0]}{more}; plan it again")
     made: dict[str, bytes | str] = {}
-    for name in dict.fromkeys(names):
-        module, options, _ = _format(name)
-        for file, content in import_module(f"quarterdeck.exporters.{module}").files(mission, settings, **options).items():
-            if file in made:
-                raise InputError(f"{name} and another of the formats both write {file}; export them to different folders")
-            made[file] = content
+    for within, part in _parts(mission, split, settings):
+        for name in dict.fromkeys(names):
+            module, options, _ = _format(name)
+            exporter = import_module(f"quarterdeck.exporters.{module}")
+            for file, content in exporter.files(part, settings, **options).items():
+                if within + file in made:
+                    raise InputError(f"{name} and another of the formats both write {file}; export them one by one")
+                made[within + file] = content
     folder = Path(out)
     paths = [folder / file for file in made]
     standing = [path for path in paths if path.exists()]
     if standing and not force:
         raise InputError(f"{standing[0]} exists; give --force to overwrite it, or another folder with -o")
     return [write_file(path, content, force=force) for path, content in zip(paths, made.values(), strict=True)]
+
+
+def _parts(mission: Mission, split: bool, settings: Settings) -> list[tuple[str, Mission]]:
+    """The missions to write and the folder of each: the mission itself, or its rounds of sorties."""
+    short = [line for route in mission.routes for line in shortfalls(mission.vehicle(route.vehicle), route)]
+    if not short:
+        return [("", mission)]
+    if not split:
+        settings.tell(f"{short[0]}; export with --sorties to have it split")
+        return [("", mission)]
+    rounds = sorties(mission)
+    away = [replace(m, routes=tuple(r for r in m.routes if len(r.waypoints) > 1)) for m in rounds]
+    return [(f"sortie-{number}/", part) for number, part in enumerate(away, 1)]
 
 
 def _format(name: str) -> tuple[str, dict[str, Any], str]:

@@ -20,7 +20,7 @@ CONTACT: dict[str, Any] = {
     "markersize": 8,
     "linestyle": "none",
 }
-_COLUMNS = (0.0, 0.075, 0.105, 0.60, 0.72, 0.86, 1.0)  # colour, number, name, length, survey, time, energy
+_COLUMNS = (0.0, 0.075, 0.105, 0.58, 0.70, 0.88, 1.0)  # colour, number, name, length, survey, time, energy
 _ROWS_FULL_SIZE = 26  # rows of the table that stand in the usual type; more are set smaller
 
 
@@ -54,7 +54,7 @@ def _planned(mission: Mission) -> list[tuple[str, ...]]:
             (route.vehicle, *_figures(route.length, _percent(surveyed, route.length), route.duration, route.energy))
         )
     longest = max((route.duration for route in mission.routes), default=0.0)
-    rows.append(("all (time: the longest)", *_figures(total[0], _percent(total[1], total[0]), longest, total[2])))
+    rows.append(("all (time: longest)", *_figures(total[0], _percent(total[1], total[0]), longest, total[2])))
     return rows
 
 

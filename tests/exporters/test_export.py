@@ -99,3 +99,14 @@ def test_the_way_home_is_told(boats, tmp_path):
     said = []
     export(replace(boats, site=replace(boats.site, obstacles=(rock,))), "qgc-wpl", tmp_path, tell=said.append)
     assert any("usv1" in line and "straight way home" in line for line in said)
+
+
+def test_what_is_too_far_is_told_or_split_into_sorties(boats, tmp_path):
+    """Without --sorties the shortfall is told; with it each round has a folder, and every file its own home and work."""
+    vehicles = tuple(replace(v, endurance=1200.0) for v in boats.vehicles)
+    far, said = replace(boats, vehicles=vehicles), []
+    export(far, "qgc-wpl", tmp_path / "whole", tell=said.append)
+    assert any("--sorties" in line for line in said)
+    paths = export(far, ["qgc-wpl", "gpx"], tmp_path / "parts", split=True)
+    assert {p.parent.name for p in paths} == {"sortie-1", "sortie-2"}
+    assert sum(p.name == "usv1.waypoints" for p in paths) == 2
