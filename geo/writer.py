@@ -8,17 +8,14 @@ from shapely import get_coordinates, orient_polygons, set_coordinates
 from shapely.geometry import mapping
 
 from quarterdeck.geo.frame import Frame
-from quarterdeck.geo.scenario import Scenario, Vehicle
+from quarterdeck.geo.scenario import Scenario, Task, Vehicle
 
 _LOOK = {"area": "#2b8cbe", "operating": "#555555", "obstacle": "#a63603"}
 _MARK = {"red": "#d62728", "yellow": "#f2c200", "green": "#2ca02c", "grey": "#7f7f7f", "black": "#000000"}
 
 
 def site_text(scenario: Scenario) -> str:
-    """Return the GeoJSON text of a scenario's site, vehicles, casualties, medics and rendezvous, one feature a line.
-
-    Tasks are left out: what writes sites has none. The same scenario gives the same bytes.
-    """
+    """Return the GeoJSON text of a scenario, one feature a line; the same scenario gives the same bytes."""
     frame, site = scenario.frame, scenario.site
     spacing = {} if scenario.spacing is None else {"spacing": scenario.spacing}
     features = [
@@ -26,6 +23,7 @@ def site_text(scenario: Scenario) -> str:
         *(_polygon(frame, "area", a.polygon, a.id, priority=a.priority, **spacing) for a in site.areas),
         *(_polygon(frame, "obstacle", o.polygon, o.id, blocks=sorted(o.blocks), height=o.height) for o in site.obstacles),
         *(_point(frame, "vehicle", v.start, v.id, **_vehicle(frame, v)) for v in scenario.vehicles),
+        *(_point(frame, "task", t.position, t.id, **_task(t)) for t in scenario.tasks),
         *(_point(frame, "medic", xy, i) for i, xy in scenario.medics),
         *(_point(frame, "rendezvous", xy, i) for i, xy in scenario.rendezvous),
         *(
@@ -52,6 +50,19 @@ def _vehicle(frame: Frame, vehicle: Vehicle) -> dict[str, Any]:
         given["sensor"] = {"kind": vehicle.sensor.kind} | swath | vehicle.sensor.parameters
     if vehicle.can:
         given["can"] = sorted(vehicle.can)
+    return given
+
+
+def _task(task: Task) -> dict[str, Any]:
+    given: dict[str, Any] = {"priority": task.priority, "service_time": task.service_time}
+    if task.after:
+        given["after"] = [{"task": a.task, "mode": a.mode} for a in task.after]
+    if task.needs:
+        given["needs"] = sorted(task.needs)
+    if task.domain is not None:
+        given["domain"] = task.domain
+    if task.window[1] < float("inf"):
+        given["window"] = list(task.window)
     return given
 
 

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -22,7 +23,10 @@ def quarterdeck(*arguments, cwd=ROOT, **options):
 def test_wheel_holds_every_room(tmp_path):
     """A wheel has each module of each room as a regular file, the samples, the schemas and the type marker."""
     pytest.importorskip("build", reason="the package `build` is not installed")
-    command = [sys.executable, "-m", "build", "--wheel", "--outdir", str(tmp_path), str(ROOT)]
+    shutil.copytree(
+        ROOT, tmp_path / "clone", symlinks=True, ignore=shutil.ignore_patterns(".*", "build", "out", "*.egg-info")
+    )
+    command = [sys.executable, "-m", "build", "--wheel", "--outdir", str(tmp_path), str(tmp_path / "clone")]
     subprocess.run(command, check=True, capture_output=True)
     names = set(zipfile.ZipFile(next(tmp_path.glob("*.whl"))).namelist())
     expected = {f"quarterdeck/{p.relative_to(ROOT)}" for r in ROOMS for p in (ROOT / r).rglob("*.py")}
