@@ -13,8 +13,8 @@ from quarterdeck.mission.tours.rng import stream
 from quarterdeck.mission.tours.schedule import schedule
 
 ITERATIONS = 100
-ROUNDS = 1000  # of ruin and recreate a generation; where whole schedules are judged, COUPLED_ROUNDS a task at most
-COUPLED_ROUNDS = 20
+ROUNDS = 20  # of ruin and recreate in a generation, for each task; and at least
+LEAST_ROUNDS = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ def search(
     n = p.service.size
     bound = lower_bound(p)
     pop = population(p, stream(seed))
-    rounds = min(ROUNDS, COUPLED_ROUNDS * n) if p.coupled else ROUNDS
+    rounds = max(LEAST_ROUNDS, ROUNDS * n)
     done, stopped = 0, "iterations"
     try:
         while pop.tally[0] == 0 or iterations is None or done < iterations:

@@ -192,3 +192,24 @@ def test_published_plans_are_optimal(case):
     assert optimum == pytest.approx(fitness, abs=0.005)
     assert theirs == pytest.approx(optimum, rel=1e-9)
     assert search(p, iterations=5).objective == pytest.approx(optimum, rel=1e-9)
+
+
+def test_ctrl_c_gives_the_best_so_far():
+    """An interrupted search returns the best it has, whole; one interrupted before it has any is an interruption."""
+
+    def interrupt(done, best, bound):
+        if done == 3:
+            raise KeyboardInterrupt
+
+    found = search(small(61), iterations=50, progress=interrupt)
+    assert found.stopped == "interrupted"
+    assert found.iterations == 3
+    assert sorted(i for row in found.rows for i in row) == list(range(len(found.start)))
+
+
+def test_the_deadline_cuts_and_says_so():
+    """A time limit ends the search after the generation in which it is over."""
+    ticks = iter(range(100))
+    found = search(small(61), iterations=50, time_limit=4.0, clock=lambda: float(next(ticks)))
+    assert found.stopped == "time limit"
+    assert found.iterations == 4
