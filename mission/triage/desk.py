@@ -80,7 +80,7 @@ class Desk:
     def drive(self, name: str, corners: Iterable[XY], speed: float, hold: float = 0.0) -> None:
         """Command a member through corners at a speed, and to wait `hold` seconds at the last."""
         points = list(corners) or [self.here(name)]
-        z = self.states[name].z
+        z = self.team.uavs[name].z if name in self.team.uavs else 0.0
         last = len(points) - 1
         self.send(
             name, [Waypoint(x, y, z, speed=speed, hold=hold if i == last else 0.0) for i, (x, y) in enumerate(points)]

@@ -40,7 +40,7 @@ def triage(team: Team, policy: Policy, settings: Settings) -> Director:
         for name in tuple(desk.agents):
             if desk.agents[name].moving and states[name].idle and name not in desk.commands and name not in desk.out:
                 _ROOM[type(desk.agents[name])].arrived(desk, name)
-        _talk(desk)
+        _talk(desk, {(e.vehicle, e.subject) for e in events if e.kind == "met"})
         return desk.commands, desk.memory()
 
     return direct
@@ -83,11 +83,11 @@ def _notice(desk: Desk, event: Event) -> None:
         medic.treated(desk, event.vehicle, event.subject)
 
 
-def _talk(desk: Desk) -> None:
-    """Let all who are in range exchange what they have to, until nobody has anything new."""
+def _talk(desk: Desk, met: set[tuple[str, str]]) -> None:
+    """Let all who are in range, or have been since the last call, exchange what they have to, until nobody has news."""
     reach = float("inf") if desk.policy.everywhere else desk.settings.talk + _EDGE
     able = [n for n in desk.agents if n not in desk.out and not desk.muted(n)]
-    pairs = [(a, b) for a, b in combinations(able, 2) if desk.distance(a, b) <= reach]
+    pairs = [p for p in combinations(able, 2) if p in met or desk.distance(*p) <= reach]
     pending = bool(pairs)
     while pending:
         pending = False
