@@ -19,6 +19,7 @@ from quarterdeck.coverage.forest import Forest, multi_prims
 from quarterdeck.coverage.graph import Graph, graph_of
 from quarterdeck.coverage.recovery import printed_supportive, recover, redivide, unseen_by
 from quarterdeck.coverage.reduced import reduced_cdt
+from quarterdeck.reproduce.guard_maps import paper_network, read_map, scenario_on
 
 HEARTBEAT = 20.0  # s between messages: what a robot saw after its last one is not confirmed
 
@@ -130,9 +131,8 @@ def main() -> None:
     args = parser.parse_args()
     rng = np.random.default_rng(args.seed)
     if args.map:
-        from quarterdeck.reproduce.guards import paper_network
-
-        net = paper_network(args.map, args.reach)
+        polygon = read_map(args.map)
+        net = paper_network(polygon, args.reach, scenario_on(polygon, 1).starts)
     began, losing, unseen, losses, printed = time.process_time(), 0, 0, 0, 0
     for _ in range(args.schedules):
         reduced, guards = (net.reduced, net.guards) if args.map else random_graph(rng)

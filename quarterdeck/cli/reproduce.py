@@ -7,6 +7,7 @@ from quarterdeck.cli import LazyGroup
 PAPERS: dict[str, str] = {
     "inspection": "Case studies of tasks with priority, time and precedence.",
     "ecdis": "Coverage by several USVs beside an ECDIS.",
+    "guards": "Limited visibility, any failures: figures, properties, theorems, complexities.",
     "triage": "Table I and Figs 6 to 9 of the triage paper.",
 }
 
