@@ -4,7 +4,7 @@ paths.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from quarterdeck.physics.likelihood import distance_field
 from quarterdeck.physics.navigation import BY_GNSS, DEAD, LIDAR, REACH, Map, Navigation
 from quarterdeck.physics.paths import SAIL
 from quarterdeck.physics.positioning import GNSS
-from quarterdeck.physics.potential_field import SCALED, field_velocity, hull_reach, safe_speed, watch_progress
+from quarterdeck.physics.potential_field import PAPER, SCALED, field_velocity, hull_reach, safe_speed, watch_progress
 
 BEAMS = 180
 NOISE, DROPOUT = 0.03, 0.01  # m of deviation; part of the beams without echo
@@ -35,6 +35,7 @@ class Sensing:
     lidar: bool = False
     amcl: bool = False
     unmapped: tuple[Obstacle, ...] = ()
+    field: Literal["scaled", "paper"] = "scaled"
 
     def __post_init__(self) -> None:
         if self.gnss is not None and self.gnss not in GNSS:
@@ -50,6 +51,7 @@ class Senses:
         self, sensing: Sensing, site: Site, vehicles: Sequence[Vehicle], pose: np.ndarray, random: np.random.Generator
     ) -> None:
         count = len(vehicles)
+        self.field = {"scaled": SCALED, "paper": PAPER}[sensing.field]
         ground = np.array([v.domain == "ground" for v in vehicles])
         self.vehicles, self.random = vehicles, random
         self.bias, self.slow = np.zeros(count), np.full(count, np.inf)
@@ -136,13 +138,15 @@ class Senses:
         corridor = (aside < self.half[:, None]) & (ahead < CARROT) & (s[:, None] + ahead < length[:, None])
         gap = ranges - self.hull
         felt = corridor | (gap < self.beside[:, None] * 0.5)
-        near = (felt & (gap < SCALED.influence)).any(axis=1)
+        near = (felt & (gap < self.field.influence)).any(axis=1)
         disc = np.broadcast_to(self.disc[:, None], ranges.shape)  # or forces would change as it turns on the spot
         moving = (legs.mode[n] == SAIL) & present[n]
         seen = np.where(felt, ranges, np.inf)
         truth = pose[n]
         speed = legs.speed[n]
-        wanted = field_velocity(truth, goal - self.navigation.error[n, :2], speed, self.angles, seen, disc, NOBODY)
+        wanted = field_velocity(
+            truth, goal - self.navigation.error[n, :2], speed, self.angles, seen, disc, NOBODY, self.field
+        )
         pace = np.hypot(*wanted.T)
         look = np.maximum(0.5 * legs.length[n], 0.8 * legs.pace[n])
         wide = cross + legs.aside[n]

@@ -91,6 +91,7 @@ def simulate(
         "gnss": sensing.gnss,
         "lidar": sensing.lidar or sensing.amcl,
         "amcl": sensing.amcl,
+        "field": sensing.field,
         "unmapped": [o.id for o in sensing.unmapped],
     }
     report = measure(

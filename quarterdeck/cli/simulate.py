@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -71,6 +71,13 @@ class Limit(click.ParamType):
 )
 @click.option("--lidar", is_flag=True, help="Ground robots see by lidar, and steer clear of what is in their way.")
 @click.option("--amcl", is_flag=True, help="Ground robots localise by their lidar on the site's map (implies --lidar).")
+@click.option(
+    "--field",
+    type=click.Choice(["scaled", "paper"]),
+    default="scaled",
+    show_default=True,
+    help="The potential field of robots with lidar: scaled by the goal's distance, or the inspection paper's.",
+)
 @click.option("--unmapped", metavar="SITE", help="GeoJSON with obstacles that are there, but that the plan does not know.")
 @seed_option
 @click.option(
@@ -93,6 +100,7 @@ def command(
     gnss: str | None,
     lidar: bool,
     amcl: bool,
+    field: Literal["scaled", "paper"],
     unmapped: str | None,
     seed: int,
     limits: tuple[tuple[str, float], ...],
@@ -116,7 +124,7 @@ def command(
             raise InputError(f"{name} exists; give --force to overwrite it, or another name")
     mission = read_plan(plan)
     strange = read_obstacles(unmapped, mission.frame) if unmapped else ()
-    sensing = Sensing(gnss=gnss, lidar=lidar, amcl=amcl, unmapped=strange)
+    sensing = Sensing(gnss=gnss, lidar=lidar, amcl=amcl, unmapped=strange, field=field)
     with _progress(mission.name) as progress:
         run = simulate(
             mission,

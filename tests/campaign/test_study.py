@@ -122,3 +122,10 @@ def test_the_replay_says_all(study: Writer) -> None:
         assert words[words.index(pair[0]) + 1] == pair[1]
     assert "--amcl" in words
     assert flat(case)["wind_east"] == case.wind[0]
+
+
+def test_the_documented_study_is_one(study: Writer) -> None:
+    """The study that docs/campaign.md shows can be read, and asks for as many runs as is said there."""
+    text = (Path(__file__).parents[2] / "docs" / "campaign.md").read_text(encoding="utf-8")
+    shown = text.split("```toml\n")[1].split("```")[0].split("\n", 1)[1].replace("usv-2", "ugv-2")
+    assert read_study(study(shown)).count == 3 * 3 * 2 * 100

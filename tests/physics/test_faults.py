@@ -7,9 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from quarterdeck.cli import main
 from quarterdeck.geo.errors import InputError
 from quarterdeck.mission.director import Command, Event
 from quarterdeck.mission.mission import Waypoint
+from quarterdeck.mission.planfile import plan_text
 from quarterdeck.physics.faults import KINDS, Fault, active, next_change, parse_fault, read_faults
 from quarterdeck.physics.simulate import simulate
 
@@ -55,6 +57,18 @@ def test_a_wrong_fault_is_one_clear_line(text: str, told: str) -> None:
         read_faults([text], FLEET, 100.0, 0)
     assert told in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.usefixtures("needs_pybullet")
+def test_a_fault_for_an_unknown_vehicle_is_one_clear_line(mow, tmp_path, capfd) -> None:
+    """From the command line: exit status 2, the nearest name, nothing simulated."""
+    path = tmp_path / "plan.geojson"
+    path.write_text(plan_text(mow("husky")), encoding="utf-8")
+    with pytest.raises(SystemExit) as stop:
+        main(["simulate", str(path), "--fail", "husky-2@10"])
+    assert stop.value.code == 2
+    (line,) = capfd.readouterr().err.strip().splitlines()
+    assert "no vehicle 'husky-2'; did you mean 'husky-1'?" in line
 
 
 @given(count=st.integers(0, 60), seed=st.integers(0, 2**32 - 1))

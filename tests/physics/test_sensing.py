@@ -90,6 +90,15 @@ def test_an_unmapped_obstacle_is_hit_blind_and_rounded_seeing(mow) -> None:
     assert seeing.report.vehicles[0].clearance > 0.1
 
 
+def test_the_papers_field_goes_round_nothing_square_in_its_way(mow) -> None:
+    """With the published gains the robot stays off the crate as well, but stops before it."""
+    mission, crate = mow("husky", spacing=5.0, length=30.0), Obstacle("crate", box(14, -1.0, 15.5, 1.0))
+    run = simulate(mission, sensing=Sensing(lidar=True, unmapped=(crate,), field="paper"), duration=60.0)
+    assert not run.report.figures["collisions"]
+    assert run.trace.x[:, 0].max() < 14
+    assert run.report.settings["field"] == "paper"
+
+
 def test_a_blocked_robot_stops_and_says_so(mow) -> None:
     """Before a wall without end the robot stops short of it and the director is told, once."""
     told = []
