@@ -69,7 +69,8 @@ def export(
     names = [to] if isinstance(to, str) else list(to)
     if autopilot not in AUTOPILOTS:
         raise InputError(f"unknown autopilot {autopilot!r}; known: {', '.join(AUTOPILOTS)}")
-    settings = Settings(autopilot, tell or (lambda _line: None))
+    told: dict[str, None] = {}
+    settings = Settings(autopilot, lambda line: told.setdefault(line))
     problems = unsound(mission) or trespasses(mission)
     if problems:
         more = f" (and {len(problems) - 1} more: `quarterdeck check` lists them)" if len(problems) > 1 else ""
@@ -83,6 +84,9 @@ def export(
                 if within + file in made:
                     raise InputError(f"{name} and another of the formats both write {file}; export them one by one")
                 made[within + file] = content
+    if tell is not None:
+        for line in told:
+            tell(line)
     folder = Path(out)
     paths = [folder / file for file in made]
     standing = [path for path in paths if path.exists()]

@@ -83,13 +83,16 @@ def _path(xy: np.ndarray) -> str:
 
 def _route(number: int, route: Route, colour: str) -> str:
     xy = route.xyz[:, :2]
-    legs = {True: "", False: ""}
-    for i in range(1, len(xy)):
-        legs[bool(route.survey[i])] += f"M{_path(xy[i - 1 : i + 1])}"
+    covers = route.survey
+    legs = {kind: _lines(xy, np.flatnonzero(covers[1:] == kind) + 1) for kind in (True, False)}
     start = f'<path class="start" d="M{xy[0, 0]:.2f} {-xy[0, 1]:.2f}h0"/>'
     lines = f'<path class="transit" d="{legs[False]}"/><path class="survey" d="{legs[True]}"/>'
     now = f'<path class="now" id="n{number}" d="M0 0h0"/>'
     return f'<g id="r{number}" stroke="{colour}"><title>{escape(route.vehicle)}</title>{lines}{start}{now}</g>'
+
+
+def _lines(xy: np.ndarray, ends: np.ndarray) -> str:
+    return "".join(f"M{_path(xy[i - 1 : i + 1])}" for i in ends)
 
 
 def _row(number: int, route: Route, colour: str) -> str:

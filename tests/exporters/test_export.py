@@ -110,3 +110,13 @@ def test_what_is_too_far_is_told_or_split_into_sorties(boats, tmp_path):
     paths = export(far, ["qgc-wpl", "gpx"], tmp_path / "parts", split=True)
     assert {p.parent.name for p in paths} == {"sortie-1", "sortie-2"}
     assert sum(p.name == "usv1.waypoints" for p in paths) == 2
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_one_waypoint_and_ten_thousand(name, make_fleet, tmp_path):
+    """A vehicle that stays where it is, and a route of ten thousand waypoints, are written or told in every format."""
+    few = make_fleet(1)
+    alone = replace(few, routes=(replace(few.routes[0], waypoints=few.routes[0].waypoints[:1]),))
+    for number, mission in enumerate((alone, make_fleet(1, lines=5000))):
+        said = []
+        assert export(mission, name, tmp_path / str(number), tell=said.append) or said
