@@ -4,6 +4,7 @@ An exporter is a module with `files(mission, settings, **options)`, which return
 writes nothing. So an export is whole or not at all: every file is made and every name checked before one is written.
 """
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -19,7 +20,9 @@ from quarterdeck.mission.sorties import sorties
 from quarterdeck.mission.timing import shortfalls
 
 Autopilot = Literal["ardupilot", "px4"]
+Altitude = Literal["relative", "terrain", "amsl"]
 AUTOPILOTS: tuple[Autopilot, ...] = ("ardupilot", "px4")
+ALTITUDES: tuple[Altitude, ...] = ("relative", "terrain", "amsl")
 
 # format: (module, its options, what it is)
 FORMATS: dict[str, tuple[str, dict[str, Any], str]] = {
@@ -43,10 +46,14 @@ FORMATS: dict[str, tuple[str, dict[str, Any], str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What an export is for: the `autopilot`, and `tell`, called with a line for what the user should know."""
+    """What an export is for: the `autopilot`; `tell`, called with a line for what the user should know; what heights count
+    from, `altitude`, and the `ground`'s metres above mean sea level, for those that count from there.
+    """
 
     autopilot: Autopilot = "ardupilot"
     tell: Callable[[str], None] = lambda _line: None
+    altitude: Altitude = "relative"
+    ground: float = 0.0
 
 
 def export(
@@ -54,23 +61,33 @@ def export(
     to: str | Iterable[str],
     out: str | Path,
     *,
-    autopilot: str = "ardupilot",
+    autopilot: Autopilot = "ardupilot",
+    altitude: Altitude = "relative",
+    ground: float | None = None,
     split: bool = False,
     force: bool = False,
     tell: Callable[[str], None] | None = None,
 ) -> list[Path]:
     """Write `mission` in each of the formats `to` (names of `FORMATS`) into the folder `out`; return the files' paths.
 
-    With `split` a mission beyond a vehicle's endurance is written as sorties (`mission.sorties`), each round into a folder
-    `sortie-1`, `sortie-2` and on. `tell` is called with one line for each limit that the mission meets in a format. Raises
-    InputError, and writes nothing, for a plan that leaves the operating area or crosses a no-go zone, an unknown format or
-    autopilot, two formats that would write the same file, and where a file stands already and not `force`.
+    Heights in autopilots' files count from home (`relative`), from the terrain that the autopilot knows (`terrain`,
+    ArduPilot only), or from mean sea level (`amsl`, with the `ground`'s metres above it). With `split` a mission beyond a
+    vehicle's endurance is written as sorties (`mission.sorties`), each round into a folder `sortie-1`, `sortie-2` and on.
+    `tell` is called with one line for each limit that the mission meets in a format. Raises InputError, and writes nothing,
+    for a plan that leaves the operating area or crosses a no-go zone, an unknown format, autopilot or altitude, two formats
+    that would write the same file, and where a file stands already and not `force`.
     """
     names = [to] if isinstance(to, str) else list(to)
     if autopilot not in AUTOPILOTS:
         raise InputError(f"unknown autopilot {autopilot!r}; known: {', '.join(AUTOPILOTS)}")
+    if altitude not in ALTITUDES:
+        raise InputError(f"unknown altitude {altitude!r}; known: {', '.join(ALTITUDES)}")
+    if altitude == "amsl" and (ground is None or not math.isfinite(ground)):
+        raise InputError("altitudes above mean sea level need the ground's: give --ground METRES")
+    if altitude == "terrain" and autopilot == "px4":
+        raise InputError("PX4 takes no mission items above terrain; export relative or amsl altitudes")
     told: dict[str, None] = {}
-    settings = Settings(autopilot, lambda line: told.setdefault(line))
+    settings = Settings(autopilot, lambda line: told.setdefault(line), altitude, ground or 0.0)
     problems = unsound(mission) or trespasses(mission)
     if problems:
         more = f" (and {len(problems) - 1} more: `quarterdeck check` lists them)" if len(problems) > 1 else ""

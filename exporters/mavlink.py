@@ -16,7 +16,8 @@ from quarterdeck.mission.mission import Mission, Route, Waypoint
 
 WAYPOINT, RETURN, LAND, TAKEOFF, DELAY = 16, 20, 21, 22, 93
 CHANGE_SPEED, TRIGGER_DISTANCE = 178, 206
-GLOBAL, MISSION_FRAME, RELATIVE = 0, 2, 3
+GLOBAL, MISSION_FRAME, RELATIVE, TERRAIN = 0, 2, 3, 10
+FRAMES = {"relative": RELATIVE, "terrain": TERRAIN, "amsl": GLOBAL}
 
 CORNER = 2.0  # m: how far from a waypoint ArduPilot 4.6 turned, flown in its own simulator
 
@@ -36,13 +37,14 @@ class Item:
     z: float = 0.0
 
 
-def mission_items(mission: Mission, route: Route, autopilot: Autopilot) -> list[Item]:
+def mission_items(mission: Mission, route: Route, settings: Settings) -> list[Item]:
     """Return the items of a route, home not among them.
 
     Aerial routes begin with a take-off and end with a return (where they end at home) or a landing; boats and rovers have
     neither, for Rover accepts a take-off and then skips it. The camera is triggered by distance on the survey legs only.
     """
-    vehicle = mission.vehicle(route.vehicle)
+    vehicle, autopilot = mission.vehicle(route.vehicle), settings.autopilot
+    frame, sea = FRAMES[settings.altitude], settings.ground if settings.altitude == "amsl" else 0.0
     places = mission.frame.to_degrees(route.xyz[:, :2])
     headings = compass(route.xyz[:, :2])
     trigger = trigger_distance(vehicle)
@@ -55,7 +57,7 @@ def mission_items(mission: Mission, route: Route, autopilot: Autopilot) -> list[
         yaw = _yaw(headings[0], autopilot)
         before = route.waypoints[path.start - 1]
         height = before.z if before.leg == "takeoff" else route.waypoints[path.start].z
-        items.append(Item(TAKEOFF, RELATIVE, (0.0, 0.0, 0.0, yaw), lat, lon, round(height, 3)))
+        items.append(Item(TAKEOFF, frame, (0.0, 0.0, 0.0, yaw), lat, lon, round(height + sea, 3)))
     speed, shooting = 0.0, False
     for i in path:
         waypoint = route.waypoints[i]
@@ -69,9 +71,8 @@ def mission_items(mission: Mission, route: Route, autopilot: Autopilot) -> list[
             continue
         hold = float(math.ceil(waypoint.hold - 1e-9))  # ArduPilot keeps whole seconds
         lon, lat = places[i]
-        items.append(
-            Item(WAYPOINT, RELATIVE, (hold, accept, 0.0, _yaw(headings[i], autopilot)), lat, lon, round(waypoint.z, 3))
-        )
+        free = (hold, accept, 0.0, _yaw(headings[i], autopilot))
+        items.append(Item(WAYPOINT, frame, free, lat, lon, round(waypoint.z + sea, 3)))
     if shooting:
         items.append(_trigger(0.0))
     if flies and path:
@@ -79,7 +80,7 @@ def mission_items(mission: Mission, route: Route, autopilot: Autopilot) -> list[
             items.append(Item(RETURN, MISSION_FRAME))
         else:
             lon, lat = places[-1]
-            items.append(Item(LAND, RELATIVE, (0.0, 0.0, 0.0, _yaw(headings[-1], autopilot)), lat, lon, 0.0))
+            items.append(Item(LAND, frame, (0.0, 0.0, 0.0, _yaw(headings[-1], autopilot)), lat, lon, sea))
     return items
 
 

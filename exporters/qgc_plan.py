@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 from shapely import Polygon
 
-from quarterdeck.exporters.export import Autopilot, Settings
+from quarterdeck.exporters.export import Settings
 from quarterdeck.exporters.fence import fence_polygons
-from quarterdeck.exporters.mavlink import RELATIVE, Item, mission_items, tell_limits
+from quarterdeck.exporters.mavlink import FRAMES, GLOBAL, RELATIVE, TERRAIN, Item, mission_items, tell_limits
 from quarterdeck.exporters.places import degrees, file_stems
 from quarterdeck.geo.frame import Frame
 from quarterdeck.mission.mission import Mission, Route
 
 FIRMWARE = {"ardupilot": 3, "px4": 12}  # MAV_AUTOPILOT
 KIND = {"aerial": 2, "ground": 10, "surface": 11}  # MAV_TYPE
-RELATIVE_MODE = 1
+MODES = {RELATIVE: 1, GLOBAL: 2, TERRAIN: 4}  # QGroundControlQmlGlobal::AltMode
 
 
 def files(mission: Mission, settings: Settings) -> dict[str, str]:
@@ -27,29 +27,28 @@ def files(mission: Mission, settings: Settings) -> dict[str, str]:
     tell_limits(mission, settings)
     _, stems = file_stems(mission)
     return {
-        f"{stems[route.vehicle]}.plan": json.dumps(_plan(mission, route, settings.autopilot), indent=1, allow_nan=False)
-        + "\n"
+        f"{stems[route.vehicle]}.plan": json.dumps(_plan(mission, route, settings), indent=1, allow_nan=False) + "\n"
         for route in mission.routes
     }
 
 
-def _plan(mission: Mission, route: Route, autopilot: Autopilot) -> dict[str, Any]:
+def _plan(mission: Mission, route: Route, settings: Settings) -> dict[str, Any]:
     vehicle = mission.vehicle(route.vehicle)
     lon, lat = degrees(mission.frame, route.xyz[:1, :2])[0].tolist()
     inclusion, exclusions = fence_polygons(mission, route.vehicle)
-    items = mission_items(mission, route, autopilot)
+    items = mission_items(mission, route, settings)
     return {
         "fileType": "Plan",
         "version": 1,
         "groundStation": "QGroundControl",
         "mission": {
             "version": 2,
-            "firmwareType": FIRMWARE[autopilot],
+            "firmwareType": FIRMWARE[settings.autopilot],
             "vehicleType": KIND[vehicle.domain],
-            "globalPlanAltitudeMode": RELATIVE_MODE,
+            "globalPlanAltitudeMode": MODES[FRAMES[settings.altitude]],
             "cruiseSpeed": vehicle.speed,
             "hoverSpeed": vehicle.speed,
-            "plannedHomePosition": [lat, lon, 0.0],
+            "plannedHomePosition": [lat, lon, settings.ground],
             "items": [_item(item, number) for number, item in enumerate(items, 1)],
         },
         "geoFence": {
@@ -73,8 +72,8 @@ def _item(item: Item, number: int) -> dict[str, Any]:
         "doJumpId": number,
         "params": [*item.p, round(float(item.lat), 8), round(float(item.lon), 8), float(item.z)],
     }
-    if item.frame == RELATIVE:
-        made |= {"AltitudeMode": RELATIVE_MODE, "Altitude": float(item.z), "AMSLAltAboveTerrain": None}
+    if item.frame in MODES:
+        made |= {"AltitudeMode": MODES[item.frame], "Altitude": float(item.z), "AMSLAltAboveTerrain": None}
     return made
 
 

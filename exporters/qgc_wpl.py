@@ -24,8 +24,8 @@ def files(mission: Mission, settings: Settings) -> dict[str, str]:
     for route in mission.routes:
         stem = stems[route.vehicle]
         lon, lat = mission.frame.to_degrees(route.xyz[:1, :2])[0]
-        home = Item(WAYPOINT, GLOBAL, lat=lat, lon=lon)
-        items = mission_items(mission, route, settings.autopilot)
+        home = Item(WAYPOINT, GLOBAL, lat=lat, lon=lon, z=settings.ground)
+        items = mission_items(mission, route, settings)
         if len(items) + 1 > MOST_ITEMS[settings.autopilot]:
             settings.tell(
                 f"{stem}.waypoints has {len(items) + 1} items; boards with {settings.autopilot} may hold no more than "

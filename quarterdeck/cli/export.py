@@ -1,6 +1,7 @@
 """`quarterdeck export`: a plan as files that autopilots, charts and people read."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -12,9 +13,13 @@ from quarterdeck.cli.output import force_option
 @click.option("--to", "formats", required=True, help="Formats parted by commas, such as qgc-wpl,png; or all.")
 @click.option("-o", "--out", default=".", show_default=True, help="The folder to write into.")
 @click.option("--autopilot", default="ardupilot", show_default=True, help="Whom mission files are for: ardupilot or px4.")
+@click.option("--altitude", default="relative", show_default=True, help="What heights count from: relative, terrain, amsl.")
+@click.option("--ground", type=float, help="Metres of the ground above mean sea level, for amsl.")
 @click.option("--sorties", is_flag=True, help="Split what is beyond a vehicle's endurance into sorties, a folder each.")
 @force_option
-def command(plan: str, formats: str, out: str, autopilot: str, sorties: bool, force: bool) -> None:
+def command(
+    plan: str, formats: str, out: str, autopilot: str, altitude: str, ground: float | None, sorties: bool, force: bool
+) -> None:
     """Write PLAN (a file, or - for standard input) in other formats; print the paths of the files, one a line.
 
     Every format and what it can't carry: docs/exports.md. A format that is not known is answered with the list.
@@ -24,7 +29,8 @@ def command(plan: str, formats: str, out: str, autopilot: str, sorties: bool, fo
 
     names = list(FORMATS) if formats == "all" else [name.strip() for name in formats.split(",") if name.strip()]
     mission = read_plan(plan)
-    for path in export(mission, names, Path(out), autopilot=autopilot, split=sorties, force=force, tell=_note):
+    options: dict[str, Any] = {"autopilot": autopilot, "altitude": altitude, "ground": ground}
+    for path in export(mission, names, Path(out), **options, split=sorties, force=force, tell=_note):
         click.echo(path)
 
 

@@ -1,13 +1,15 @@
 """WPL files as pymavlink, the strictest rules and the autopilots read them."""
 
+import json
 import math
 import re
 
 import numpy as np
 import pytest
 
-from quarterdeck.exporters import qgc_wpl
-from quarterdeck.exporters.export import Settings
+from quarterdeck.exporters import qgc_plan, qgc_wpl
+from quarterdeck.exporters.export import Settings, export
+from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.frame import Frame
 
 mavwp = pytest.importorskip("pymavlink.mavwp", reason="pymavlink is not installed")
@@ -108,3 +110,24 @@ def test_too_many_items_are_told(make_fleet):
     made = qgc_wpl.files(make_fleet(1, lines=5000), Settings("ardupilot", said.append))
     assert len(made["usv1.waypoints"].splitlines()) > 10000
     assert "724" in said[0]
+
+
+@pytest.mark.parametrize(
+    ("altitude", "frame", "height"), [("relative", 3, 40.0), ("terrain", 10, 40.0), ("amsl", 0, 152.5)]
+)
+def test_heights_count_from_what_was_asked(tmp_path, quads, altitude, frame, height):
+    """Take-off and waypoints are in the frame of the altitude; only heights above the sea have the ground's added."""
+    settings = Settings("ardupilot", altitude=altitude, ground=112.5)
+    items = load(tmp_path, qgc_wpl.files(quads, settings)["quad1.waypoints"])
+    assert {(w.frame, w.z) for w in items[1:] if w.command in (16, 22)} == {(frame, height)}
+    plan = json.loads(qgc_plan.files(quads, settings)["quad1.plan"])["mission"]
+    modes = {(i["frame"], i["AltitudeMode"], i["Altitude"]) for i in plan["items"] if "Altitude" in i}
+    assert modes == {(frame, {3: 1, 10: 4, 0: 2}[frame], height)}
+    assert plan["plannedHomePosition"][2] == 112.5
+
+
+def test_altitudes_that_cannot_be_are_refused(quads, tmp_path):
+    """Above the sea without the ground, and above terrain for PX4, are each one line."""
+    for options, words in (({"altitude": "amsl"}, "--ground"), ({"altitude": "terrain", "autopilot": "px4"}, "PX4")):
+        with pytest.raises(InputError, match=words):
+            export(quads, "qgc-wpl", tmp_path, **options)
