@@ -14,7 +14,7 @@ from scipy.sparse.linalg import spsolve
 from quarterdeck.coverage.cuts import SIMPLE, hanging, is_simple, move_hanging
 
 ROUNDS = 400
-PATIENCE = 40
+PATIENCE = 25
 """Rounds without progress after which the search ends."""
 
 KICKS, KICK_CELLS = 200, 2_000_000
@@ -54,8 +54,8 @@ def balance(
             return labels
         if stale > patience:
             break
-        want = _flow(surplus, np.sqrt(border) * ease, targets)
-        if want.any() and np.abs(surplus).max() > 2:
+        want = _flow(surplus, np.sqrt(border) * ease, targets) if np.abs(surplus).max() > 2 else border[:0]
+        if want.any():
             moved = _transfer(labels, is_start, want, width, lane, SIMPLE)
             rest = want - moved
             if 4 * rest.sum() > want.sum():
@@ -378,6 +378,7 @@ def _chains(labels, starts, targets, width, rng):  # type: ignore[no-untyped-def
     moves = 0
     came = np.empty(k, dtype=np.int32)
     queue = np.empty(k, dtype=np.int32)
+    shuffled = rng.permutation(k)
     for source in np.argsort(-surplus + rng.random(k) * 0.5):
         if surplus[source] <= 0.0 or not free[source]:
             continue
@@ -388,7 +389,7 @@ def _chains(labels, starts, targets, width, rng):  # type: ignore[no-untyped-def
         while first < last and end < 0:
             i = queue[first]
             first += 1
-            for j in rng.permutation(k):
+            for j in shuffled:
                 if came[j] < 0 and movable[i, j] >= 0 and free[j]:
                     came[j] = i
                     queue[last] = j

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import KDTree
 
-from quarterdeck.coverage.balance import balance, rebalance
+from quarterdeck.coverage.balance import PATIENCE, balance, rebalance
 from quarterdeck.coverage.bound import cells_at_least, fair_targets, pocket_bound
 from quarterdeck.coverage.bricks import straight_trees, tree_turns
 from quarterdeck.coverage.chambers import chamber_bound
@@ -22,10 +22,13 @@ from quarterdeck.geo.errors import InputError
 STRETCH = 8
 """How much dearer a step across the lanes is than one along them when regions grow along rows or columns."""
 
-LOOKS = 1000
+BRIEF = 6
+"""Rounds without progress that further divisions get when one is balanced."""
+
+LOOKS = 800
 """How many cells the straightening of borders may look at for each cell of the area; 90 million take about a second."""
 
-LEAST_LOOKS, MOST_LOOKS = 2_000_000, 200_000_000
+LEAST_LOOKS, MOST_LOOKS = 1_500_000, 200_000_000
 """But no fewer and no more in all."""
 
 
@@ -85,7 +88,10 @@ def divide(
     floor = cells_at_least(bound, shares)
 
     rng = np.random.default_rng(seed)
-    tried = [balance(labels, cells, wanted, width, lane, rng) for labels, (_, _, lane) in zip(grown, lanes, strict=True)]
+    tried: list[np.ndarray] = []
+    for labels, (_, _, lane) in zip(grown, lanes, strict=True):
+        done = any(_worst(other, floor) <= 1 for other in tried)
+        tried.append(balance(labels, cells, wanted, width, lane, rng, patience=BRIEF if done else PATIENCE))
     worst = np.array([_worst(labels, floor) for labels in tried])
     if worst.min() > 1:
         bound = max(bound, chamber_bound(reachable, starts, shares), key=lambda b: b.load)

@@ -15,6 +15,9 @@ WAYS = 16
 HOT, COLD = 1.0, 0.05
 """Temperatures of the annealing, in lanes."""
 
+TRIAL = 300
+"""What a trial takes besides the cells of its window, in cells."""
+
 
 @numba.njit(cache=True)
 def recombine(labels, starts, width, rng, budget):  # type: ignore[no-untyped-def]
@@ -34,7 +37,7 @@ def recombine(labels, starts, width, rng, budget):  # type: ignore[no-untyped-de
     total = best_total = 0.0
     left = budget
     while left > 0:
-        left -= k
+        left -= k + TRIAL
         i = rng.integers(0, k)
         beside = np.flatnonzero(near[i])
         if len(beside) == 0:
