@@ -17,7 +17,8 @@ class Problem(NamedTuple):
     `travel` (c, n, n) between tasks, symmetric; `out` (k, n) from a robot's start, `home` (k, n) to its end, `idle` (k,)
     from start to end; `kind` (k,) a robot's class. `service` (n,), `weight` (n,) of a task's start in the objective,
     `opens` and `closes` (n,) the window of its start, `tier` (n,) for hard tiers (all zero without), `can` (k, n),
-    `endurance` (k,). `pred` (n, n) bool: row task waits for column task, transitively closed; `group` (n,): tasks of one
+    `endurance` (k,). `pred` (n, n) bool: row task waits for column task, transitively closed; `before` (n, most)
+    the same as lists, filled up with -1; `group` (n,): tasks of one
     group ride with one robot, -1 is none. `near` (n, n - 1) the other tasks, nearest first. `level` (n,) is the paper's
     priority, read with `paper`. `shape`, `shape_a`, `shape_b`: the priority function and its parameters; `coupled`: a
     route's times depend on more than sums of its legs, so that candidates are judged by the whole schedule.
@@ -36,6 +37,7 @@ class Problem(NamedTuple):
     can: np.ndarray
     endurance: np.ndarray
     pred: np.ndarray
+    before: np.ndarray
     group: np.ndarray
     near: np.ndarray
     level: np.ndarray
@@ -103,6 +105,7 @@ def problem(
         can=allowed,
         endurance=np.full(k, np.inf) if endurance is None else np.array(endurance, dtype=float),
         pred=pred,
+        before=_lists(pred),
         group=group,
         near=np.ascontiguousarray(nearest, dtype=np.int64),
         level=np.zeros(n) if level is None else np.array(level, dtype=float),
@@ -133,6 +136,13 @@ def closure(n: int, after: Sequence[tuple[int, int, bool]], names: Sequence[str]
         return pred
     ring = " before ".join(names[a] for a, _ in cycle)
     raise InputError(f"tasks wait for each other in a circle: {ring} before {names[cycle[0][0]]}; remove one 'after'")
+
+
+def _lists(pred: np.ndarray) -> np.ndarray:
+    lists = np.full((len(pred), int(pred.sum(axis=1).max(initial=0))), -1, np.int64)
+    for task, row in enumerate(pred):
+        lists[task, : row.sum()] = np.flatnonzero(row)
+    return lists
 
 
 def groups(n: int, after: Sequence[tuple[int, int, bool]]) -> np.ndarray:

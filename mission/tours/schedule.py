@@ -32,14 +32,16 @@ def schedule(
     k = length.shape[0]
     start[:] = -2.0
     todo = 0
+    can, tier, service, opens, closes = p.can, p.tier, p.service, p.opens, p.closes  # out of the tuple once: it costs
+    travel, out, before, coupled = p.travel, p.out, p.before, p.coupled
     for r in range(k):
         todo += length[r]
         for i in range(length[r]):
             task = seq[r, i]
             start[task] = -1.0
-            if not p.can[r, task] or (i > 0 and p.tier[task] > p.tier[seq[r, i - 1]]):
+            if not can[r, task] or (i > 0 and tier[task] > tier[seq[r, i - 1]]):
                 return np.inf, np.inf, np.inf
-    if p.coupled and not _whole(p, seq, length):
+    if coupled and not _whole(p.group, seq, length):
         return np.inf, np.inf, np.inf
     if p.paper:
         return _paper(p, seq, length, start, done)
@@ -50,15 +52,16 @@ def schedule(
     while moved and todo > 0:
         moved = False
         for r in range(k):
+            c = p.kind[r]
             while place[r] < length[r]:
                 task = seq[r, place[r]]
-                ready = _ready(p, task, start) if p.coupled else 0.0
+                ready = _ready(before, service, task, start) if coupled else 0.0
                 if ready < 0.0:
                     break
-                before = p.out[r, task] if place[r] == 0 else p.travel[p.kind[r], seq[r, place[r] - 1], task]
-                start[task] = max(done[r] + before, p.opens[task], ready)
-                late += max(0.0, start[task] - p.closes[task])
-                done[r] = start[task] + p.service[task]
+                leg = out[r, task] if place[r] == 0 else travel[c, seq[r, place[r] - 1], task]
+                start[task] = max(done[r] + leg, opens[task], ready)
+                late += max(0.0, start[task] - closes[task])
+                done[r] = start[task] + service[task]
                 place[r] += 1
                 todo -= 1
                 moved = True
@@ -71,9 +74,10 @@ def schedule(
         late += max(0.0, done[r] - p.endurance[r])
         total += done[r]
         makespan = max(makespan, done[r])
+    weight, linear = p.weight, p.shape == LINEAR
     for task in range(start.shape[0]):
-        if start[task] >= 0.0 and p.weight[task] > 0.0:
-            makespan += p.weight[task] * shaped(p, start[task])
+        if start[task] >= 0.0 and weight[task] > 0.0:
+            makespan += weight[task] * (start[task] if linear else shaped(p, start[task]))
     return makespan, total, late
 
 
@@ -91,11 +95,11 @@ def shaped(p: Problem, t: float) -> float:
 
 
 @njit(cache=True)
-def _whole(p: Problem, seq: np.ndarray, length: np.ndarray) -> bool:
-    rider = np.full(p.group.shape[0], -1, np.int64)
+def _whole(group: np.ndarray, seq: np.ndarray, length: np.ndarray) -> bool:
+    rider = np.full(group.shape[0], -1, np.int64)
     for r in range(length.shape[0]):
         for i in range(length[r]):
-            g = p.group[seq[r, i]]
+            g = group[seq[r, i]]
             if g >= 0:
                 if rider[g] >= 0 and rider[g] != r:
                     return False
@@ -104,14 +108,17 @@ def _whole(p: Problem, seq: np.ndarray, length: np.ndarray) -> bool:
 
 
 @njit(cache=True)
-def _ready(p: Problem, task: int, start: np.ndarray) -> float:
+def _ready(before: np.ndarray, service: np.ndarray, task: int, start: np.ndarray) -> float:
     """Return when those before `task` are finished (the missing do not count), or -1 if one has not started."""
     ready = 0.0
-    for first in range(start.shape[0]):
-        if p.pred[task, first] and start[first] != -2.0:
+    for q in range(before.shape[1]):
+        first = before[task, q]
+        if first < 0:
+            break
+        if start[first] != -2.0:
             if start[first] < 0.0:
                 return -1.0
-            ready = max(ready, start[first] + p.service[first])
+            ready = max(ready, start[first] + service[first])
     return ready
 
 

@@ -15,6 +15,7 @@ from quarterdeck.mission.tours.schedule import schedule
 ITERATIONS = 100
 ROUNDS = 20  # of ruin and recreate in a generation, for each task; and at least
 LEAST_ROUNDS = 200
+COUPLED = 10_000_000  # rounds x tasks^2 at most where whole schedules are judged: about two seconds a generation
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +57,7 @@ def search(
     n = p.service.size
     bound = lower_bound(p)
     pop = population(p, stream(seed))
-    rounds = max(LEAST_ROUNDS, ROUNDS * n)
+    rounds = max(LEAST_ROUNDS, min(ROUNDS * n, COUPLED // n**2) if p.coupled else ROUNDS * n)
     done, stopped = 0, "iterations"
     try:
         while pop.tally[0] == 0 or iterations is None or done < iterations:
