@@ -46,14 +46,10 @@ def chase(knots: np.ndarray, here: XY, speed: float, now: float, ways: Ways) -> 
 
     Whoever is late, or took his stops in another order, is still near it: so back along all of it and once more to its end.
     """
-    if ways is straight:
-        x, y, k = _meet(knots, here[0], here[1], speed, now)
-        via = [(float(x), float(y))]
-    else:
-        k, via = _meet_at_knot(knots, here, speed, now, ways)
-    corners = [c for a, b in zip([here, *via], via, strict=False) for c in ways(a, b)]
+    place, k = _meeting(knots, here, speed, now, ways)
+    corners = list(ways(here, place))
     course = [(float(x), float(y)) for x, y in knots[:, 1:]]
-    for place in (*course[int(k) :], *course[::-1], *course):
+    for place in (*course[k:], *course[::-1], *course):
         if place != corners[-1]:
             corners.append(place)
     return corners
@@ -88,15 +84,23 @@ def meeting_time(knots: np.ndarray, here: XY, speed: float, now: float) -> float
     return float(now + np.hypot(x - here[0], y - here[1]) / speed)
 
 
-def _meet_at_knot(knots: np.ndarray, here: XY, speed: float, now: float, ways: Ways) -> tuple[int, list[XY]]:
-    """Return the first corner of the course that is reached in time around obstacles, or its end."""
+def intercept(knots: np.ndarray, here: XY, speed: float, now: float, ways: Ways) -> list[XY]:
+    """Return the corners to drive through to the meeting with the predicted course `knots`, and no further."""
+    return list(ways(here, _meeting(knots, here, speed, now, ways)[0]))
+
+
+def _meeting(knots: np.ndarray, here: XY, speed: float, now: float, ways: Ways) -> tuple[XY, int]:
+    """Return where to meet, and the index of the knot after it: around obstacles, the first corner reached in time."""
+    if ways is straight:
+        x, y, k = _meet(knots, here[0], here[1], speed, now)
+        return (float(x), float(y)), int(k)
     for k, (time, x, y) in enumerate(knots):
         place = (float(x), float(y))
         if time >= now or k == len(knots) - 1:
             path = np.array([here, *ways(here, place)])
             arrival = now + float(np.hypot(*np.diff(path, axis=0).T).sum()) / speed
             if arrival <= time or k == len(knots) - 1:
-                return k + 1, [place]
+                return place, k + 1
     raise AssertionError("a course has at least one corner")
 
 

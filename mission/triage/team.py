@@ -86,8 +86,8 @@ def make_team(scenario: Scenario, method: str, settings: Settings, search: Searc
     clearance = max(u.clearance for u in ugvs)
     ground = scenario.site.navigable("ground", clearance)
     on_ground, on_foot = ways_in(ground), ways_in(scenario.site.navigable("ground"))
-    in_air = ways_in(scenario.site.navigable("aerial"))
-    _check_places(scenario)
+    air = scenario.site.navigable("aerial", max((u.clearance for u in uavs), default=0.0))
+    _check(scenario)
     spacing = scenario.spacing or settings.spacing
     sees = [u.range or settings.ugv_sees for u in ugvs]
     field = as_multipolygon(scenario.site.area.intersection(scenario.site.navigable("ground")))
@@ -111,10 +111,10 @@ def make_team(scenario: Scenario, method: str, settings: Settings, search: Searc
         search=search,
         ground=ground,
         foot=scenario.site.navigable("ground"),
-        air=scenario.site.navigable("aerial"),
+        air=air,
         on_ground=on_ground,
         on_foot=on_foot,
-        in_air=in_air,
+        in_air=ways_in(air),
         distances=_distances(on_foot),
     )
 
@@ -179,7 +179,11 @@ def _distances(ways: Ways) -> Callable[[np.ndarray], np.ndarray]:
     return straight_distances if ways is straight else around
 
 
-def _check_places(scenario: Scenario) -> None:
+def _check(scenario: Scenario) -> None:
+    ids = [*(v.id for v in scenario.vehicles), *(m for m, _ in scenario.medics)]
+    for kind, names in (("vehicles and medics", ids), ("casualties", [c.id for c in scenario.casualties])):
+        if twice := sorted({n for n in names if names.count(n) > 1}):
+            raise InputError(f"{kind}: the id {twice[0]!r} is given twice; give each its own")
     operating = scenario.site.operating
     foot = scenario.site.navigable("ground")
     for kind, named in (("medic", scenario.medics), ("rendezvous", scenario.rendezvous)):

@@ -6,7 +6,7 @@ import numpy as np
 
 from quarterdeck.mission.mission import Waypoint
 from quarterdeck.mission.triage import medic
-from quarterdeck.mission.triage.chase import chase, meeting_time, predict
+from quarterdeck.mission.triage.chase import chase, intercept, meeting_time, predict
 from quarterdeck.mission.triage.desk import Desk
 from quarterdeck.mission.triage.records import Belief, Report, Uav
 from quarterdeck.mission.triage.settings import RANK
@@ -119,7 +119,7 @@ def _next_ugv(desk: Desk, name: str) -> str:
 
 
 def _fly_to_ugv(desk: Desk, name: str, ugv: str) -> None:
-    """Meet a UGV on its path, where it must be if nothing has befallen it; wait for it at the end."""
+    """Meet a UGV on its path, where it must be if nothing has befallen it; wait for it there."""
     me: Uav = desk.agents[name]
     time, reached, at = (me.visits or {})[ugv]
     robot = desk.team.ugvs[ugv]
@@ -127,8 +127,9 @@ def _fly_to_ugv(desk: Desk, name: str, ugv: str) -> None:
     seconds = np.concatenate([[0.0], np.hypot(*np.diff(np.array(rest), axis=0).T).cumsum() / robot.speed])
     knots = np.column_stack([time + seconds, np.array(rest)])
     desk.change(name, target=ugv)
-    corners = chase(knots, desk.here(name), desk.team.uavs[name].speed, desk.time, desk.team.in_air)
-    desk.drive(name, corners[:1], desk.team.uavs[name].speed, hold=desk.settings.patience)
+    speed = desk.team.uavs[name].speed
+    corners = intercept(knots, desk.here(name), speed, desk.time, desk.team.in_air)
+    desk.drive(name, corners, speed, hold=desk.settings.patience)
 
 
 def _fly_to_medic(desk: Desk, name: str) -> None:

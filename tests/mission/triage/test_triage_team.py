@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from shapely import MultiPolygon, box
+from shapely import LineString, MultiPolygon, box
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Casualty, Obstacle, Scenario, Site
@@ -20,13 +20,11 @@ def walled() -> Scenario:
     return replace(base, site=Site(base.site.areas, base.site.operating, obstacles))
 
 
-@pytest.mark.parametrize("method", sorted(METHODS))
-def test_obstacles_are_gone_around(method: str) -> None:
+@pytest.mark.parametrize(("method", "rendezvous"), [*((m, "fixed") for m in sorted(METHODS)), ("relay", "round-robin")])
+def test_obstacles_are_gone_around(method: str, rendezvous: str) -> None:
     """With obstacles all are found and treated, and nobody's track crosses one."""
-    from shapely import LineString
-
     scenario = generate(walled(), 5, casualties=(10, 10))
-    o = run_triage(scenario, method)
+    o = run_triage(scenario, method, Settings(rendezvous=rendezvous))
     assert o.reasons == ()
     for name, track in o.run.tracks.items():
         domain = "aerial" if name.startswith("uav") else "ground"
@@ -43,6 +41,8 @@ def test_obstacles_are_gone_around(method: str) -> None:
         (lambda s: replace(s, rendezvous=(("r", (90.0, 25.0)),)), "rendezvous 'r' is 10.0 m outside"),
         (lambda s: replace(s, casualties=(Casualty("c", (40.0, 40.0), "red"),)), "casualty 'c' is inside obstacle 'wall'"),
         (lambda s: replace(s, casualties=(Casualty("c", (-1.0, 40.0), "red"),)), "casualty 'c' is outside"),
+        (lambda s: replace(s, medics=(("ugv1", (40.0, 25.0)),)), "'ugv1' is given twice"),
+        (lambda s: replace(s, casualties=(Casualty("c", (5.0, 5.0), "red"),) * 2), "'c' is given twice"),
         (lambda s: replace(s, site=Site((), MultiPolygon([box(0, 0, 80, 50)]))), "no field"),
     ],
 )
