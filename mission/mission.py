@@ -59,6 +59,12 @@ class Route:
         return self.waypoints[-1].time + self.waypoints[-1].hold if self.waypoints else 0.0
 
 
+def unbroken(points: np.ndarray, chosen: np.ndarray) -> list[np.ndarray]:
+    """Return the (m, d) line of each unbroken run of `chosen` (n,) legs of (n, d) `points`; leg i ends at point i."""
+    edges = np.flatnonzero(np.diff(np.r_[0, chosen.astype(np.int8), 0]))
+    return [points[max(a - 1, 0) : b] for a, b in edges.reshape(-1, 2) if b - max(a - 1, 0) >= 2]
+
+
 @dataclass(frozen=True, slots=True)
 class Layer:
     """Something to draw beside the routes, such as a division, guards or trees: shapely `geometries` in metres.

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from quarterdeck.geo.errors import InputError
-from quarterdeck.mission.mission import Mission, Route
+from quarterdeck.mission.mission import Mission, Route, unbroken
 from quarterdeck.mission.timing import RESERVE
 
 
@@ -70,9 +70,7 @@ def _surveyed(route: Route, reached: int, position: tuple[float, float, float]) 
     survey = np.append(
         route.survey[:reached], reached < len(route.waypoints) and route.survey[min(reached, len(route.survey) - 1)]
     )
-    starts = np.flatnonzero(survey & ~np.roll(survey, 1)) - 1
-    ends = np.flatnonzero(survey & ~np.roll(survey, -1))
-    return [points[a : b + 1] for a, b in zip(starts, ends, strict=True)]
+    return unbroken(points, survey)
 
 
 def energy_left(battery: float, used: float) -> float:

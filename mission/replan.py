@@ -11,7 +11,7 @@ from quarterdeck.coverage.metrics import track_length, uncovered
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Area, Obstacle, Scenario, Site, Vehicle, as_multipolygon
 from quarterdeck.mission.cover import cover, roadmaps, trackable
-from quarterdeck.mission.mission import Mission, Route, Waypoint
+from quarterdeck.mission.mission import Mission, Route, Waypoint, unbroken
 from quarterdeck.mission.progress import Progress, energy_left
 from quarterdeck.mission.routes import line_routes, survey_tracks
 from quarterdeck.mission.sharing import remaining_parts, share_out
@@ -160,25 +160,16 @@ def _left(
     reach = None
     if changes.obstacles or changes.withdrawn:
         reach = trackable(scenario, spacing).buffer(1e-6 * spacing)
-    by_vehicle = {
-        r.vehicle: [line for run in _runs(r) for line in remaining_parts(run, done, reach)] for r in mission.routes
-    }
+    runs = {r.vehicle: unbroken(r.xyz[:, :2], r.survey) for r in mission.routes}
+    by_vehicle = {v: [line for run in own for line in remaining_parts(run, done, reach)] for v, own in runs.items()}
     released = [line for vehicle in sorted(changes.lost) for line in by_vehicle[vehicle]]
     if changes.areas:
         fresh = replace(scenario, site=replace(scenario.site, areas=changes.areas))
         fresh = replace(fresh, vehicles=tuple(replace(v, share=None) for v in scenario.vehicles))
         angle, edge = mission.parameters.get("angle"), mission.parameters.get("edge", "cells")
         added = cover(fresh, spacing=spacing, seed=seed, angle=angle, edge=edge)
-        released += [run for r in added.routes for run in _runs(r)]
+        released += [run for r in added.routes for run in unbroken(r.xyz[:, :2], r.survey)]
     return [by_vehicle.get(v.id, []) for v in scenario.vehicles], released
-
-
-def _runs(route: Route) -> list[np.ndarray]:
-    """Return the (n, 2) lines of a route's unbroken runs of survey legs."""
-    xy, survey = route.xyz[:, :2], route.survey
-    starts = np.flatnonzero(survey & ~np.roll(survey, 1)) - 1
-    ends = np.flatnonzero(survey & ~np.roll(survey, -1))
-    return [xy[a : b + 1] for a, b in zip(starts, ends, strict=True)]
 
 
 def _figures(

@@ -10,7 +10,7 @@ from quarterdeck.coverage.metrics import straight_pieces
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.geo.transit import Roadmap, shortest_paths
 from quarterdeck.mission.corners import driven, with_turns
-from quarterdeck.mission.mission import Leg, Route
+from quarterdeck.mission.mission import Leg, Route, unbroken
 from quarterdeck.mission.timing import shortfalls, timed_route
 
 PIVOT = np.pi  # radians: a turn on the spot, at the most
@@ -103,10 +103,7 @@ def _linked(vehicle: Vehicle, lines: Sequence[np.ndarray], road: Roadmap) -> tup
 
 def survey_tracks(vehicle: Vehicle, route: Route) -> list[np.ndarray]:
     """Return the (n, 2) lines in metres along which a route surveys, corners rounded as the vehicle drives them."""
-    xy, survey = route.xyz[:, :2], route.survey
-    starts = np.flatnonzero(survey & ~np.roll(survey, 1)) - 1
-    ends = np.flatnonzero(survey & ~np.roll(survey, -1))
-    return [driven(xy[a : b + 1], vehicle.turn_radius) for a, b in zip(starts, ends, strict=True)]
+    return [driven(line, vehicle.turn_radius) for line in unbroken(route.xyz[:, :2], route.survey)]
 
 
 def _launch_delay(vehicles: Sequence[Vehicle], index: int) -> float:

@@ -8,7 +8,7 @@ from shapely import LineString
 
 from quarterdeck.coverage.metrics import uncovered
 from quarterdeck.geo.scenario import Site
-from quarterdeck.mission.mission import Route
+from quarterdeck.mission.mission import Route, unbroken
 from quarterdeck.physics.paths import LEGS
 from quarterdeck.physics.trace import Trace
 
@@ -25,7 +25,7 @@ def covered_fraction(site: Site, tracks: Sequence[LineString], spacing: float) -
 
 def planned_tracks(routes: Iterable[Route]) -> list[LineString]:
     """Return the survey legs of routes, legs that follow one another joined."""
-    return [line for route in routes for line in _runs(route.xyz[:, :2], route.survey)]
+    return [LineString(line) for route in routes for line in unbroken(route.xyz[:, :2], route.survey)]
 
 
 def driven_tracks(trace: Trace) -> list[LineString]:
@@ -33,11 +33,5 @@ def driven_tracks(trace: Trace) -> list[LineString]:
     tracks: list[LineString] = []
     for i in range(len(trace.vehicles)):
         surveying = trace.kind[:, i] == LEGS.index("survey")
-        tracks += _runs(np.column_stack([trace.x[:, i], trace.y[:, i]]), surveying)
+        tracks += [LineString(line) for line in unbroken(np.column_stack([trace.x[:, i], trace.y[:, i]]), surveying)]
     return list(shapely.simplify(tracks, TOLERANCE, preserve_topology=False))
-
-
-def _runs(xy: np.ndarray, chosen: np.ndarray) -> list[LineString]:
-    """Return a line for each unbroken run of chosen points, begun at the point before it."""
-    edges = np.flatnonzero(np.diff(np.r_[0, chosen.astype(np.int8), 0]))
-    return [LineString(xy[max(a - 1, 0) : b]) for a, b in edges.reshape(-1, 2) if b - max(a - 1, 0) >= 2]
