@@ -21,7 +21,8 @@ from quarterdeck.geo.grid import TOLERANCE, Grid
 
 Edge = Literal["whole", "cells", "lap"]
 
-CHEAP = 0.2  # `cells` runs on where it covers this many cells' area per cell of length; a whole tour covers 1
+CHEAP = 0.15  # `cells` runs on where it covers this many cells' area per cell of length; a whole tour covers 1
+TURN = 0.2  # the length that one turn less is worth, where the caller does not say
 DEAR = 0.03  # `lap` goes on down to this
 ALLOWANCE = 0.198  # `lap` may drive this much more per square metre covered than `whole`: 0.2, less what sampling errs
 RING_PAYS = 0.15  # a lap is considered when it covers this many cells' area per cell of length
@@ -44,8 +45,7 @@ def lay_tracks(
 
     `area` is what the grid was placed on; `target` what is to be covered, where that is more (None: the same). `tours` are
     (n, 2) path cells in order (`coverage.tour`); a track begins at the first cell of its tour. `turn_cost` is the length
-    in metres that is worth one turn less (None: a twentieth of the spacing when reaching out, half of it for the choice
-    between a lap and many short reaches). Raises InputError if `edge` is not known.
+    in metres that is worth one turn less (None: a fifth of the spacing). Raises InputError if `edge` is not known.
     """
     if edge not in get_args(Edge):
         raise InputError(f"edge {edge!r} is not one of {', '.join(get_args(Edge))}")
@@ -55,11 +55,11 @@ def lay_tracks(
     if edge != "whole" and paths:
         space = _to_lattice(shapely.normalize(area), grid)
         wanted = space if target is None else _to_lattice(shapely.normalize(target), grid)
-        turn = None if turn_cost is None else turn_cost / grid.spacing
+        turn = TURN if turn_cost is None else turn_cost / grid.spacing
         if edge == "cells":
-            paths = grow(paths, space, wanted, least=CHEAP, turn_cost=0.05 if turn is None else turn)
+            paths = grow(paths, space, wanted, least=CHEAP, turn_cost=turn)
         else:
-            paths = _lap(paths, space, wanted, 0.5 if turn is None else turn)
+            paths = _lap(paths, space, wanted, turn)
     return [grid.centres(_trimmed(np.vstack([p, p[:1]]))[:, ::-1]) for p in paths]
 
 
@@ -86,22 +86,27 @@ def _lap(paths: list[np.ndarray], space: MultiPolygon, wanted: MultiPolygon, tur
     whole = sum(track_length(np.vstack([p, p[:1]])) for p in paths)
     limit = (1 + ALLOWANCE) * whole / _covered(paths, wanted)
     starts = [p for p in (paths, _with_rings(paths, space, wanted, limit)) if p is not None]
-    plans = [
-        _Plan.of(grow(p, space, wanted, least=DEAR, turn_cost=0.0, most_per_area=limit), wanted, turn_cost) for p in starts
-    ]
+    reach = {"least": DEAR, "turn_cost": turn_cost, "most_per_area": limit}
+    plans = [_Plan.of(grow(p, space, wanted, **reach), wanted, turn_cost) for p in starts]
     if max(p.covered for p in plans) < ENOUGH * wanted.area:
-        plans += [_Plan.of(q, wanted, turn_cost) for p in plans for q in _smoothed(p.paths, space, wanted, limit)]
+        plans += [_Plan.of(q, wanted, turn_cost) for p in plans for q in _smoothed(p.paths, space, wanted, reach)]
     most = max(p.covered for p in plans)
     return min((p for p in plans if p.covered >= most - 0.002 * wanted.area), key=lambda p: p.cost).paths
 
 
-def _smoothed(paths: list[np.ndarray], space: MultiPolygon, wanted: MultiPolygon, limit: float) -> list[list[np.ndarray]]:
+def _smoothed(
+    paths: list[np.ndarray], space: MultiPolygon, wanted: MultiPolygon, reach: dict[str, float]
+) -> list[list[np.ndarray]]:
     """Return what polishing and growing in turn make of the paths, within the limit; they bend more than others."""
     stages = [paths]
     for price in PRICES:
         smooth = polished(stages[-1], space, wanted, price=price, turn_cost=BEND)
-        stages.append(grow(smooth, space, wanted, least=DEAR, turn_cost=0.0, most_per_area=limit))
-    return [p for p in stages[1:] if sum(track_length(np.vstack([q, q[:1]])) for q in p) <= limit * _covered(p, wanted)]
+        stages.append(grow(smooth, space, wanted, **reach))
+    return [
+        p
+        for p in stages[1:]
+        if sum(track_length(np.vstack([q, q[:1]])) for q in p) <= reach["most_per_area"] * _covered(p, wanted)
+    ]
 
 
 @dataclass(frozen=True, slots=True)
