@@ -37,6 +37,7 @@ FORMATS: dict[str, tuple[str, dict[str, Any], str]] = {
     "png": ("picture", {}, "map of the plan"),
     "qgc-plan": ("qgc_plan", {}, "mission, fence and rally points for QGroundControl and MAVSDK"),
     "qgc-wpl": ("qgc_wpl", {}, "mission, fence and rally files for ArduPilot, PX4, Mission Planner, QGroundControl"),
+    "qgis": ("qgis", {}, "layers of routes and site, styled for QGIS"),
     "rerun": ("recording", {}, "recording for the rerun viewer"),
     "rtz": ("rtz", {"version": "1.0"}, "routes for ECDIS, version 1.0, the most widely read"),
     "rtz-1.1": ("rtz", {"version": "1.1"}, "the same, version 1.1"),

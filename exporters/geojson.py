@@ -26,11 +26,12 @@ SURVEY_WIDTH, TRANSIT_WIDTH = 3, 1.5
 def files(mission: Mission, settings: Settings) -> dict[str, str]:  # noqa: ARG001 - no autopilot reads it
     """Return one FeatureCollection, `<mission>.geojson`: site, tasks, and each vehicle's survey and other legs."""
     stem = file_stems(mission)[0]
-    document = {"type": "FeatureCollection", "features": list(_features(mission))}
+    document = {"type": "FeatureCollection", "features": [*site_features(mission), *route_features(mission)]}
     return {f"{stem}.geojson": json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1) + "\n"}
 
 
-def _features(mission: Mission) -> Iterator[dict[str, Any]]:
+def site_features(mission: Mission) -> Iterator[dict[str, Any]]:
+    """Yield the operating area, the areas, the obstacles and the tasks."""
     site, frame = mission.site, mission.frame
     yield _feature(frame, site.operating, name="operating area", stroke="#555555", **_filled(0.0))
     for area in site.areas:
@@ -40,6 +41,11 @@ def _features(mission: Mission) -> Iterator[dict[str, Any]]:
     for task in mission.tasks:
         point = shapely.Point(task.position)
         yield _feature(frame, point, name=task.id, **{"marker-color": "#666666", "marker-size": "small"})
+
+
+def route_features(mission: Mission) -> Iterator[dict[str, Any]]:
+    """Yield each vehicle's runs of legs, and its start with the route's figures."""
+    frame = mission.frame
     for route, colour in zip(mission.routes, colours(len(mission.routes)), strict=True):
         yield from _legs(frame, route, colour)
         figures: dict[str, Any] = {"length_m": round(route.length, 1), "duration_s": round(route.duration, 1)}
