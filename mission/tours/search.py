@@ -15,7 +15,8 @@ from quarterdeck.mission.tours.schedule import schedule
 ITERATIONS = 100
 ROUNDS = 20  # of ruin and recreate in a generation, for each task; and at least
 LEAST_ROUNDS = 200
-COUPLED = 10_000_000  # rounds x tasks^2 at most where whole schedules are judged: about two seconds a generation
+COUPLED = 1_000_000  # rounds x tasks^2 at most where whole schedules are judged, unless that is less than the least
+PATIENCE = 25  # generations without improvement after which a search without a time limit ends
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,8 +25,8 @@ class Solution:
     when a robot is home (under the paper's objective both are its costs); `late` the seconds of lateness and missing
     endurance.
 
-    `objective` is exact, `bound` what nothing can beat; `stopped` says what ended the search: `iterations`, `time limit`,
-    `proved optimal` or `interrupted`.
+    `objective` is exact, `bound` what nothing can beat; `stopped` says what ended the search: `iterations`, `patience`,
+    `time limit`, `proved optimal` or `interrupted`.
     """
 
     rows: tuple[tuple[int, ...], ...]
@@ -59,6 +60,7 @@ def search(
     pop = population(p, stream(seed))
     rounds = max(LEAST_ROUNDS, min(ROUNDS * n, COUPLED // n**2) if p.coupled else ROUNDS * n)
     done, stopped = 0, "iterations"
+    best, since = np.inf, 0
     try:
         while pop.tally[0] == 0 or iterations is None or done < iterations:
             generation(p, pop, rounds)
@@ -67,6 +69,11 @@ def search(
                 progress(done, float(pop.cost[0, 0]), bound)
             if n < 2 or pop.cost[0, 0] <= bound * (1 + 1e-12):
                 stopped = "proved optimal"
+                break
+            since = since + 1 if pop.cost[0, 0] >= best else 0
+            best = float(pop.cost[0, 0])
+            if time_limit is None and since == PATIENCE:
+                stopped = "patience"
                 break
             if time_limit is not None and clock() - begun >= time_limit:
                 stopped = "time limit"
