@@ -33,7 +33,7 @@ def figures(room: MultiPolygon, reach: float, robots: int) -> bytes:
         f"Fig. 1: trapezoids and {len(guards)} guards, range {reach:g} m",
         f"Fig. 2b: CDT, {len(net.cdt.edges)} edges",
         f"Fig. 2c: Reduced-CDT, {net.reduced.weight:.0f} m",
-        "Fig. 3: trees by Multi-Prim's; orange: links through vertices of no tree",
+        "Fig. 3: trees; orange: where Lemma 1 has no bridge",
         "Fig. 4d: constrained spanning tours",
         "Fig. 5: trees when robot 1 is lost",
     )
