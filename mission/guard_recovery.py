@@ -60,6 +60,20 @@ def guards_from_now(mission: Mission, scenario: Scenario, served: frozenset[str]
     )
 
 
+def with_confirmed(mission: Mission, served: frozenset[str]) -> Mission:
+    """Return the mission with the guards of `served` stops marked as seen; any other mission as it is."""
+    if mission.method != "guards":
+        return mission
+
+    def told(layer: Layer) -> Layer:
+        if layer.name != "guards":
+            return layer
+        marked = tuple({**p, "seen": _done(p, served)} for p in layer.properties)
+        return replace(layer, properties=marked)
+
+    return replace(mission, layers=tuple(told(layer) for layer in mission.layers))
+
+
 def _confirmed(mission: Mission, served: frozenset[str]) -> list[tuple[shapely.Point, float]]:
     """Return place and range of each guard whose observation is confirmed, now or before the mission was made."""
     layer = next(layer for layer in mission.layers if layer.name == "guards")

@@ -11,6 +11,7 @@ from quarterdeck.coverage.metrics import track_length, uncovered
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Area, Obstacle, Scenario, Site, Vehicle, as_multipolygon
 from quarterdeck.mission.cover import cover, roadmaps, trackable
+from quarterdeck.mission.guard_recovery import guards_from_now, with_confirmed
 from quarterdeck.mission.mission import Mission, Route, Waypoint, unbroken
 from quarterdeck.mission.progress import Progress, energy_left
 from quarterdeck.mission.routes import line_routes, survey_tracks
@@ -47,7 +48,9 @@ def replan(mission: Mission, progress: Progress, changes: Changes = Changes(), *
     """
     _check(mission, changes)
     if not changes:
-        return _rest(mission, progress)
+        return with_confirmed(_rest(mission, progress), progress.served)
+    if mission.method == "guards":
+        return _guards(mission, progress, changes, mission.seed if seed is None else seed)
     if mission.spacing is None:
         raise InputError(f"a plan made by {mission.method!r} has no survey lines to share out; plan the rest as a site")
     vehicles = _survivors(mission, progress, changes)
@@ -77,6 +80,17 @@ def replan(mission: Mission, progress: Progress, changes: Changes = Changes(), *
         reasons=tuple(reasons),
         layers=(),
     )
+
+
+def _guards(mission: Mission, progress: Progress, changes: Changes, seed: int) -> Mission:
+    """Return a guards mission from now on: guards not confirmed go to the survivors, new ones where the site changed."""
+    vehicles = _survivors(mission, progress, changes)
+    site = _changed_site(mission.site, changes)
+    scenario = Scenario(mission.name, mission.frame, site, vehicles, input_hash=mission.input_hash)
+    after = guards_from_now(mission, scenario, progress.served, seed=seed)
+    told = dict(after.parameters) | {"replanned_at": progress.time, "lost": sorted(changes.lost)}
+    routes = tuple(_airborne(r, v, progress) for v, r in zip(vehicles, after.routes, strict=True))
+    return replace(after, routes=routes, parameters=told)
 
 
 def _check(mission: Mission, changes: Changes) -> None:

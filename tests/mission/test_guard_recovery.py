@@ -8,10 +8,12 @@ from quarterdeck.coverage.guards.certificate import uncovered_by_shadows
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.models import load_model
 from quarterdeck.geo.scenario import Area, Obstacle, Scenario, Site, Vehicle, as_multipolygon
+from quarterdeck.mission.guard_check import unproved
 from quarterdeck.mission.guard_recovery import guards_from_now
 from quarterdeck.mission.guards import plan_guards
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.progress import planned_progress
+from quarterdeck.mission.replan import Changes, replan
 
 BORDER = shapely.box(0, 0, 60, 40)
 PILLARS = (shapely.box(10, 10, 20, 30), shapely.Polygon([(30, 5), (50, 8), (45, 20)]), shapely.box(30, 28, 50, 34))
@@ -112,3 +114,16 @@ def test_a_new_obstacle_gets_new_guards_and_nothing_left_needs_none(plan: tuple[
     done = guards_from_now(mission, replace(given, vehicles=working), served)
     assert done.figures["guards"] == 0
     assert done.feasible
+
+
+def test_replan_takes_guards_plans_and_its_plans_pass_the_check(plan: tuple[Scenario, Mission]) -> None:
+    """Through the common door: nothing changed, and one lost; both plans' coverage is proved from their own layers."""
+    _, mission = plan
+    time = 0.4 * mission.figures["duration"]
+    same = replan(mission, planned_progress(mission, time))
+    assert unproved(same) == []
+    stopped = {"b": 0.5 * time}
+    after = replan(mission, planned_progress(mission, time, stopped=stopped), Changes(lost=frozenset(stopped)))
+    assert after.feasible
+    assert unproved(after) == []
+    assert {r.vehicle for r in after.routes} == {"a", "c"}
