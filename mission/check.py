@@ -123,6 +123,8 @@ def _too_near(mission: Mission) -> list[str]:
 
 def _astray(mission: Mission) -> list[str]:
     """Routes that survey outside the areas."""
+    if mission.method == "guards":  # what counts is what is seen from the stops, not what is driven over
+        return []
     if not mission.site.areas:
         return []
     area = mission.site.area.buffer(TOLERANCE)
