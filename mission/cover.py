@@ -72,7 +72,8 @@ def cover_grid(
     parts_of_all = shares(vehicles)
     roads = roadmaps(scenario)
     regions, notes = divided(scenario, grid, roads, seed)
-    laid = iter(lay_tracks(trackable(scenario, step), grid, [t for region in regions for t in region.tours], edge=edge))
+    tours_of_all = [t for region in regions for t in region.tours]
+    laid = iter(lay_tracks(trackable(scenario, step), grid, tours_of_all, edge=edge, target=site.coverable))
     tracks = [[next(laid) for _ in region.tours] for region in regions]
     routes, reasons = survey_routes(vehicles, tracks, roads)
     figures = asdict(measure([t for own in tracks for t in own], site.coverable, grid))
