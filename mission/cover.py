@@ -14,20 +14,22 @@ from shapely import MultiPolygon
 
 from quarterdeck.coverage.division import Division, distinct_entries, divide
 from quarterdeck.coverage.edge import Edge, lay_tracks
-from quarterdeck.coverage.metrics import measure, uncovered
+from quarterdeck.coverage.metrics import measure, track_length, uncovered
 from quarterdeck.coverage.parts import allot, connected_parts, whole_targets
 from quarterdeck.coverage.placement import Method, place
-from quarterdeck.coverage.shares import shares
+from quarterdeck.coverage.shares import even_shares, shares
 from quarterdeck.coverage.tour import tours
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.grid import Grid
 from quarterdeck.geo.scenario import Scenario, Vehicle, as_multipolygon
 from quarterdeck.geo.transit import Roadmap, roadmap, shortest_paths
 from quarterdeck.geo.version import VERSION
-from quarterdeck.mission.mission import Layer, Mission
+from quarterdeck.mission.mission import Layer, Mission, Route, unbroken
 from quarterdeck.mission.routes import survey_routes, survey_tracks
+from quarterdeck.mission.timing import seconds_out
 
 MAX_HYPERVERTICES = 4_000_000
+ROUNDS = 2  # of dividing again, once ways and turns are known
 
 
 def cover(
@@ -69,14 +71,18 @@ def cover_grid(
 ) -> Mission:
     """Return the mission that covers the hypervertices of a placed grid; `parameters` are told in it beside the grid's."""
     vehicles, site, step = scenario.vehicles, scenario.site, grid.spacing
-    parts_of_all = shares(vehicles)
     roads = roadmaps(scenario)
-    regions, notes = divided(scenario, grid, roads, seed)
-    tours_of_all = [t for region in regions for t in region.tours]
-    laid = iter(lay_tracks(trackable(scenario, step), grid, tours_of_all, edge=edge, target=site.coverable))
-    tracks = [[next(laid) for _ in region.tours] for region in regions]
-    routes, reasons = survey_routes(vehicles, tracks, roads)
-    figures = asdict(measure([t for own in tracks for t in own], site.coverable, grid))
+    length = 4 * step * float(grid.hypervertices.sum())
+    even = even_shares(length, *_figures_alone(vehicles))
+    done = _attempt(scenario, grid, roads, shares(vehicles, even), edge, seed)
+    for _ in range(ROUNDS if len(vehicles) > 1 and all(v.share is None for v in vehicles) else 0):
+        # Ways out and home, and turns, are known now: shares that count them make the slowest sooner done.
+        again = _attempt(scenario, grid, roads, even_shares(*_figures_on(vehicles, done.routes)), edge, seed)
+        if again.merit >= done.merit:
+            break
+        done = again
+    regions, routes = done.regions, done.routes
+    figures = asdict(measure([t for own in done.tracks for t in own], site.coverable, grid))
     missed = uncovered(
         [t for v, r in zip(vehicles, routes, strict=True) for t in survey_tracks(v, r)], site.coverable, step
     )
@@ -87,8 +93,8 @@ def cover_grid(
         "makespan": max(r.duration for r in routes),
         "energy": sum(r.energy for r in routes),
         "shares": cells / max(1, cells.sum()),
-        "notes": notes,
-        "share_error_hypervertices": float(np.abs(cells - parts_of_all * cells.sum()).max()),
+        "notes": done.notes,
+        "share_error_hypervertices": float(np.abs(cells - done.shares * cells.sum()).max()),
     }
     return Mission(
         name=scenario.name,
@@ -104,11 +110,59 @@ def cover_grid(
         tasks=scenario.tasks,
         figures=figures,
         bounds={"moves": max(region.bound for region in regions)},
-        reasons=tuple(reasons),
+        reasons=tuple(done.reasons),
         layers=(_region_layer(grid, vehicles, regions),),
         input_hash=scenario.input_hash,
         version=VERSION,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Attempt:
+    """A division by `shares` and what comes of it."""
+
+    shares: np.ndarray
+    regions: list["Region"]
+    tracks: list[list[np.ndarray]]
+    routes: tuple[Route, ...]
+    reasons: list[str]
+    notes: list[str]
+
+    @property
+    def merit(self) -> tuple[int, float]:
+        """Less is better: what cannot be done, then the makespan in seconds."""
+        return len(self.reasons), max(r.duration for r in self.routes)
+
+
+def _attempt(
+    scenario: Scenario, grid: Grid, roads: Sequence[Roadmap], parts_of_all: np.ndarray, edge: Edge, seed: int
+) -> _Attempt:
+    regions, notes = divided(scenario, grid, roads, parts_of_all, seed)
+    tours_of_all = [t for region in regions for t in region.tours]
+    area = trackable(scenario, grid.spacing)
+    laid = iter(lay_tracks(area, grid, tours_of_all, edge=edge, target=scenario.site.coverable))
+    tracks = [[next(laid) for _ in region.tours] for region in regions]
+    routes, reasons = survey_routes(scenario.vehicles, tracks, roads)
+    return _Attempt(parts_of_all, regions, tracks, routes, reasons, notes)
+
+
+def _figures_alone(vehicles: Sequence[Vehicle]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return (k,) speeds on survey in m/s, seconds on the way out and home, seconds that each can be out."""
+    limits = np.array([seconds_out(v) for v in vehicles])
+    return np.array([v.speed for v in vehicles]), np.zeros(len(vehicles)), limits
+
+
+def _figures_on(vehicles: Sequence[Vehicle], routes: Sequence[Route]) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the metres surveyed on routes, and the figures of `_figures_alone` as the routes show them, turns counted."""
+    speeds, away, limits = _figures_alone(vehicles)
+    total = 0.0
+    for i, route in enumerate(routes):
+        surveyed = sum(track_length(line) for line in unbroken(route.xyz[:, :2], route.survey))
+        surveying = float(np.diff([w.time for w in route.waypoints])[route.survey[1:]].sum())
+        away[i] = route.duration - surveying
+        speeds[i] = surveyed / surveying if surveying > 0 else speeds[i]
+        total += surveyed
+    return total, speeds, away, limits
 
 
 def track_spacing(scenario: Scenario, given: float | None = None) -> float:
@@ -176,13 +230,14 @@ class Region:
         return int(self.mask.sum())
 
 
-def divided(scenario: Scenario, grid: Grid, roads: Sequence[Roadmap], seed: int) -> tuple[list[Region], list[str]]:
+def divided(
+    scenario: Scenario, grid: Grid, roads: Sequence[Roadmap], parts_of_all: np.ndarray, seed: int
+) -> tuple[list[Region], list[str]]:
     """Divide the free hypervertices, each connected part among those that a transport problem sends there.
 
-    Returns the vehicles' regions, and notes on shares that could not be had.
+    `parts_of_all` (k,) are the shares. Returns the vehicles' regions, and notes on shares that could not be had.
     """
     vehicles = scenario.vehicles
-    parts_of_all = shares(vehicles)
     free, k = grid.hypervertices, len(vehicles)
     if not free.any():  # all is covered already, or all that is left has no room: everyone goes home
         return [Region(np.zeros_like(free), [], 0)] * k, []

@@ -9,6 +9,7 @@ from shapely import LineString
 from quarterdeck.coverage.lines import Lines, lay_lines, split_area
 from quarterdeck.coverage.metrics import measure
 from quarterdeck.coverage.placement import place
+from quarterdeck.coverage.shares import shares
 from quarterdeck.geo.scenario import Scenario, Vehicle
 from quarterdeck.geo.transit import Roadmap, shortest_paths
 from quarterdeck.geo.version import VERSION
@@ -36,7 +37,7 @@ def plan_lines(
     area = trackable(scenario, step)
     grid = place(area, step, seed=seed, angle=angle).grid
     vehicles, roads = scenario.vehicles, roadmaps(scenario)
-    regions, notes = divided(scenario, grid, roads, seed)
+    regions, notes = divided(scenario, grid, roads, shares(vehicles), seed)
     labels = np.full(grid.hypervertices.shape, -1)
     for i, region in enumerate(regions):
         labels[region.mask] = i

@@ -68,6 +68,13 @@ def turn_times(vehicle: Vehicle, points: np.ndarray) -> np.ndarray:
     return stop * np.sin(angle / 2)
 
 
+def seconds_out(vehicle: Vehicle) -> float:
+    """Return the seconds that a vehicle can be out at its speed, by endurance and by battery, with `RESERVE` in hand."""
+    power = vehicle.model.power(vehicle.speed)
+    by_battery = vehicle.battery * 3600.0 / power if power > 0 else math.inf
+    return (1 - RESERVE) * min(vehicle.endurance, by_battery)
+
+
 def shortfalls(vehicle: Vehicle, route: Route) -> list[str]:
     """Return why the vehicle cannot do the route, one line each; none if it can, with `RESERVE` in hand."""
     found = []
