@@ -26,7 +26,7 @@ counts as absent. Properties that are not ours are ignored, unless they look lik
 """
 
 MEANINGS = {
-    "area": "to be covered; several allowed",
+    "area": "to be covered; several allowed; along a line: a corridor `width` metres across, square at its ends",
     "operating": "where vehicles may move, hence the fence; default: the hull of areas, starts and tasks, with clearance",
     "obstacle": "never covered; crossed only by the domains that it does not block",
     "vehicle": "where a vehicle starts; several may share a point",

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from shapely import MultiPolygon, Polygon, is_valid_reason, union_all
+from shapely import MultiLineString, MultiPolygon, Polygon, is_valid_reason, line_merge, union_all
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.frame import Frame
@@ -99,6 +99,32 @@ def read_polygon(geometry: dict[str, Any], frame: Frame) -> MultiPolygon:
         polygons.append(polygon)
     # A part cut at the antimeridian meets its other half again here, but for rounding: a micrometre grid closes it.
     return as_multipolygon(union_all(polygons, grid_size=1e-6) if len(polygons) > 1 else polygons[0])
+
+
+def read_corridor(geometry: dict[str, Any], width: float, frame: Frame) -> MultiPolygon:
+    """Return what is within half of `width` metres of a (Multi)LineString, in metres; it ends square where the line ends.
+
+    Raises InputError, naming the line, if one has fewer than 2 different positions.
+    """
+    several = geometry["type"] == "MultiLineString"
+    parts = geometry["coordinates"] if several else [geometry["coordinates"]]
+    if not isinstance(parts, list) or not parts:
+        raise InputError("the geometry has no coordinates")
+    lines = []
+    for p, line in enumerate(parts):
+        place = f"line {p}" if several else "the line"
+        if not isinstance(line, list) or len(line) < 2:
+            raise InputError(f"{place} has {len(line) if isinstance(line, list) else 0} positions; a line needs at least 2")
+        for i, position in enumerate(line):
+            if problem := position_problem(position):
+                raise InputError(f"{place}, position {i}: {problem}")
+        # Rounded to a micrometre, lines that meet, or were cut at the antimeridian, share their point.
+        xy = np.round(frame.to_metres(np.array([p[:2] for p in line], dtype=float)), 6)
+        if (xy == xy[0]).all():
+            raise InputError(f"{place} has no length; it needs 2 different positions")
+        lines.append(xy)
+    merged = line_merge(MultiLineString(lines))  # one line where parts meet, else a bend there would have a notch
+    return as_multipolygon(merged.buffer(width / 2.0, quad_segs=8, cap_style="flat"))
 
 
 def _ring(ring: Any, place: str, frame: Frame) -> np.ndarray:

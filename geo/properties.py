@@ -9,8 +9,9 @@ from difflib import get_close_matches
 from typing import Any
 
 POLYGONS = ("Polygon", "MultiPolygon")
+LINES = ("LineString", "MultiLineString")
 GEOMETRIES = {
-    "area": POLYGONS,
+    "area": POLYGONS + LINES,
     "operating": POLYGONS,
     "obstacle": POLYGONS,
     "vehicle": ("Point",),
@@ -48,6 +49,9 @@ PROPERTIES: dict[str, dict[str, Property]] = {
         "id": _ID,
         "priority": Property({"type": "integer", "minimum": 0}, "a whole number from 0", "higher ones are covered first"),
         "spacing": _number("a number above 0", "metres between neighbouring tracks (the paper's 2 delta)", **_POSITIVE),
+        "width": _number(
+            "a number above 0", "metres across the corridor along a line; lines only, and they need it", **_POSITIVE
+        ),
     },
     "operating": {"id": _ID},
     "obstacle": {
@@ -208,7 +212,7 @@ def _feature_schema(role: str) -> dict[str, Any]:
     properties: dict[str, Any] = {"role": {"const": role}}
     for name, known in PROPERTIES[role].items():
         properties[name] = {"description": known.meaning, "anyOf": [known.schema, {"type": "null"}]}
-    return {
+    return (_CORRIDOR if "width" in properties else {}) | {
         "title": role,
         "type": "object",
         "required": ["type", "geometry", "properties"],
@@ -218,3 +222,10 @@ def _feature_schema(role: str) -> dict[str, Any]:
             "properties": {"type": "object", "required": ["role"], "properties": properties},
         },
     }
+
+
+_CORRIDOR: dict[str, Any] = {  # a line has a width, a polygon has none
+    "if": {"properties": {"geometry": {"properties": {"type": {"enum": list(LINES)}}}}},
+    "then": {"properties": {"properties": {"required": ["width"], "properties": {"width": NUMBER}}}},
+    "else": {"properties": {"properties": {"properties": {"width": {"type": "null"}}}}},
+}

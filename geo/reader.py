@@ -13,9 +13,9 @@ from shapely.ops import unary_union
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.frame import Frame
-from quarterdeck.geo.geojson import parse, position_problem, positions, read_polygon
+from quarterdeck.geo.geojson import parse, position_problem, positions, read_corridor, read_polygon
 from quarterdeck.geo.models import DEFAULT_MODEL, load_model
-from quarterdeck.geo.properties import GEOMETRIES, POLYGONS, property_problems
+from quarterdeck.geo.properties import GEOMETRIES, LINES, property_problems
 from quarterdeck.geo.scenario import (
     DOMAINS,
     Area,
@@ -173,7 +173,13 @@ def _feature(index: int, raw: Any, problems: list[str]) -> dict[str, Any] | None
     found = [f"{place}: {p}" for p in property_problems(role, properties)]
     if kind == "Point" and (problem := position_problem(geometry.get("coordinates"))):
         found.append(f"{place}: {problem}")
-    if kind in POLYGONS:
+    if kind in LINES and properties.get("width") is None:
+        found.append(
+            f'{place}: a {kind} needs the property "width", metres across the corridor along it; or draw a polygon'
+        )
+    if kind not in LINES and role == "area" and properties.get("width") is not None:
+        found.append(f"{place}: width belongs to a LineString; a {kind} has its own, remove it")
+    if kind != "Point":
         wrong = next((p for p in map(position_problem, positions(geometry)) if p), None)
         found += [f"{place}: {wrong}"] if wrong else []
     problems += found
@@ -200,24 +206,28 @@ def _frame(features: Sequence[dict[str, Any]], problems: list[str]) -> Frame:
 
 
 def _shapes(features: Sequence[dict[str, Any]], frame: Frame, problems: list[str]) -> dict[str, MultiPolygon]:
-    """Return each polygon feature's shape in metres, by place."""
+    """Return the shape of each polygon, and of the corridor along each line, in metres, by place."""
     shapes = {}
     for f in features:
         xy = frame.to_metres(np.array([p[:2] for p in positions(f["geometry"])], dtype=float))
         if not len(xy):
             problems.append(f"{f['place']}: the geometry has no positions")
             continue
+        kind, width = f["geometry"]["type"], float(f["properties"].get("width") or 0.0)
         far = float(np.hypot(*xy.T).max()) if np.isfinite(xy).all() else float("inf")
-        if far > MAX_RADIUS and f["geometry"]["type"] == "Point":
+        far += width / 2.0 if kind in LINES else 0.0
+        if far > MAX_RADIUS and kind == "Point":
             problems.append(
                 f"{f['place']}: is {far / 1000:,.0f} km from the site's centre, more than {MAX_RADIUS / 1000:.0f} km"
             )
         elif far > MAX_RADIUS:
             problems.append(f"{f['place']}: reaches {far / 1000:,.0f} km from the site's centre, more than "
                             f"{MAX_RADIUS / 1000:.0f} km; split it into sites")  # fmt: skip
-        elif f["geometry"]["type"] in POLYGONS:
+        elif kind != "Point":
             try:
-                shapes[f["place"]] = read_polygon(f["geometry"], frame)
+                drawn = f["geometry"]
+                shape = read_corridor(drawn, width, frame) if kind in LINES else read_polygon(drawn, frame)
+                shapes[f["place"]] = shape
             except InputError as error:
                 problems.append(f"{f['place']}: {error}")
     return shapes
