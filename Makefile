@@ -31,8 +31,8 @@ bench: bench-coverage bench-physics bench-assign  ## ratios, not tests: minutes
 bench-coverage: $(VENV)/installed
 	$(BIN)/python benchmarks/coverage_table.py
 
-bench-physics: $(VENV)/installed
-	$(BIN)/python benchmarks/simulation.py --table
+bench-physics: $(VENV)/installed  ## PVS=, GPD=: checkouts of PythonVehicleSimulator, gym-pybullet-drones to run beside
+	$(BIN)/python benchmarks/simulation.py --table $(if $(PVS),--peer pvs=$(PVS)) $(if $(GPD),--peer gpd=$(GPD))
 
 bench-assign: $(VENV)/installed
 	$(BIN)/python -m pip install --quiet pyvrp ortools

@@ -2,14 +2,18 @@
 
 Vehicles on parallel survey legs over 20 km2 (ground: 1 km2) among 200 obstacles of 16 corners, PyBullet at 10 Hz,
 everything recorded, the report included. One process, one core; times are processor seconds, compilation apart.
+`--peer pvs=PATH` and `--peer gpd=PATH`, checkouts of PythonVehicleSimulator and gym-pybullet-drones, have peers.py run them
+beside ours.
 """
 
 import argparse
 import json
 import resource
+import subprocess
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +27,7 @@ from quarterdeck.physics.sensing import Sensing
 from quarterdeck.physics.simulate import simulate
 
 REACH = {"surface": 5000.0, "ground": 1000.0, "aerial": 5000.0}  # m, length of a survey leg
+PEERS = {"pvs": "surface", "gpd": "aerial"}  # what peers.py runs, and what it is set beside
 BREADTH = {"surface": 4000.0, "ground": 1000.0, "aerial": 4000.0}  # m, over which the vehicles share themselves out
 
 
@@ -79,6 +84,33 @@ def measure(
     }
 
 
+def beside(row: dict[str, Any], peers: dict[str, str]) -> dict[str, Any]:
+    """Return the row with the figure of the peer of its domain, run now on as many vehicles (50 at most), and our ratio."""
+    added: dict[str, Any] = {"peer": None, "peer_vehicle_seconds_per_second": None, "ratio": None}
+    for peer, path in peers.items():
+        if PEERS[peer] == row["domain"]:
+            count = str(min(row["vehicles"], 50))
+            script = str(Path(__file__).with_name("peers.py"))
+            done = subprocess.run(  # apart: what it imports and opens is no business of ours
+                [sys.executable, script, peer, path, "--vehicles", count], stdout=subprocess.PIPE, text=True, check=False
+            )
+            if done.returncode:
+                raise SystemExit(f"--peer {peer}={path} could not be run")
+            theirs = json.loads(done.stdout.splitlines()[-1])
+            speed = theirs["vehicle_seconds_per_second"]
+            ratio = round(row["vehicle_seconds_per_second"] / speed, 1)
+            added = {"peer": theirs["peer"], "peer_vehicle_seconds_per_second": speed, "ratio": ratio}
+    return row | added
+
+
+def checkout(text: str) -> tuple[str, str]:
+    """Read NAME=PATH."""
+    peer, _, path = text.partition("=")
+    if peer not in PEERS or not Path(path or "?").is_dir():
+        raise argparse.ArgumentTypeError(f"{text!r} is not pvs=PATH or gpd=PATH with the folder of its checkout")
+    return peer, path
+
+
 def main() -> None:
     """Parse the command line, run, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -91,6 +123,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=3, help="the median of so many")
     parser.add_argument("--lidar", action="store_true", help="ground robots see: 180 beams at 10 Hz")
     parser.add_argument("--amcl", action="store_true", help="and localise by it: particle filters at 2 Hz")
+    parser.add_argument("--peer", type=checkout, action="append", default=[], help="run it too: pvs=PATH or gpd=PATH")
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--table", action="store_true", help="5, 50 and 1,000 vehicles of each domain instead")
     o = parser.parse_args()
@@ -102,6 +135,8 @@ def main() -> None:
         measure(count, domain, o.model or DEFAULT_MODEL[domain], seconds, o.step, o.gusts, o.runs, sensing)
         for count, domain, seconds in cases
     ]
+    if o.peer:
+        rows = [beside(row, dict(o.peer)) for row in rows]
     if o.json:
         json.dump(rows if o.table else rows[0], sys.stdout, indent=2)
         print()
