@@ -9,13 +9,14 @@ import shapely
 
 from quarterdeck.coverage.metrics import track_length, uncovered
 from quarterdeck.geo.errors import InputError
-from quarterdeck.geo.scenario import Area, Obstacle, Scenario, Site, Vehicle, as_multipolygon
+from quarterdeck.geo.scenario import Area, Obstacle, Scenario, Site, Task, Vehicle, as_multipolygon
 from quarterdeck.mission.cover import cover, roadmaps, trackable
 from quarterdeck.mission.guard_recovery import guards_from_now, with_confirmed
 from quarterdeck.mission.mission import Mission, Route, Waypoint, unbroken
 from quarterdeck.mission.progress import Progress, energy_left
 from quarterdeck.mission.routes import line_routes, survey_tracks
 from quarterdeck.mission.sharing import remaining_parts, share_out
+from quarterdeck.mission.task_recovery import assign_from_now
 from quarterdeck.mission.timing import shortfalls, timed_route
 
 VISITED = 0.25  # spacings: a survey line is done where a track came so near
@@ -31,10 +32,11 @@ class Changes:
     gone: frozenset[str] = frozenset()
     areas: tuple[Area, ...] = ()
     withdrawn: frozenset[str] = frozenset()
+    tasks: tuple[Task, ...] = ()
 
     def __bool__(self) -> bool:
         """Whether anything is different."""
-        return any((self.lost, self.joined, self.obstacles, self.gone, self.areas, self.withdrawn))
+        return any((self.lost, self.joined, self.obstacles, self.gone, self.areas, self.withdrawn, self.tasks))
 
 
 def replan(mission: Mission, progress: Progress, changes: Changes = Changes(), *, seed: int | None = None) -> Mission:
@@ -51,6 +53,8 @@ def replan(mission: Mission, progress: Progress, changes: Changes = Changes(), *
         return with_confirmed(_rest(mission, progress), progress.served)
     if mission.method == "guards":
         return _guards(mission, progress, changes, mission.seed if seed is None else seed)
+    if mission.method == "assign":
+        return _tasks(mission, progress, changes, mission.seed if seed is None else seed)
     if mission.spacing is None:
         raise InputError(f"a plan made by {mission.method!r} has no survey lines to share out; plan the rest as a site")
     vehicles = _survivors(mission, progress, changes)
@@ -93,14 +97,32 @@ def _guards(mission: Mission, progress: Progress, changes: Changes, seed: int) -
     return replace(after, routes=routes, parameters=told)
 
 
+def _tasks(mission: Mission, progress: Progress, changes: Changes, seed: int) -> Mission:
+    """Return a mission of tasks from now on: those not done and not withdrawn, and new ones, go to the survivors."""
+    vehicles = _survivors(mission, progress, changes)
+    tasks = (*(t for t in mission.tasks if t.id not in changes.withdrawn), *changes.tasks)
+    scenario = Scenario(
+        mission.name, mission.frame, _changed_site(mission.site, changes), vehicles, tasks, input_hash=mission.input_hash
+    )
+    after = assign_from_now(mission, scenario, progress, seed=seed)
+    told = dict(after.parameters) | {"replanned_at": progress.time, "lost": sorted(changes.lost)}
+    routes = tuple(_airborne(r, v, progress) for v, r in zip(vehicles, after.routes, strict=True))
+    return replace(after, routes=routes, parameters=told)
+
+
 def _check(mission: Mission, changes: Changes) -> None:
     for what, ids, known in (
         ("vehicle", changes.lost, [v.id for v in mission.vehicles]),
         ("obstacle", changes.gone, [o.id for o in mission.site.obstacles]),
-        ("area", changes.withdrawn, [a.id for a in mission.site.areas]),
+        ("area or task", changes.withdrawn, [*(a.id for a in mission.site.areas), *(t.id for t in mission.tasks)]),
     ):
         for unknown in sorted(set(ids) - set(known)):
             raise InputError(f"unknown {what} {unknown!r}; the plan has {', '.join(known)}")
+    again = {t.id for t in changes.tasks} & {t.id for t in mission.tasks}
+    if again:
+        raise InputError(f"task {min(again)!r} is in the plan already; give the new one another id")
+    if changes.tasks and mission.method != "assign":
+        raise InputError(f"a plan made by {mission.method!r} has no tasks; a new one needs a plan of `quarterdeck assign`")
     twice = {v.id for v in changes.joined} & {v.id for v in mission.vehicles} - changes.lost
     if twice:
         raise InputError(f"vehicle {min(twice)!r} is in the plan already; give the one that joins another id")

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Any
 from quarterdeck.geo.version import VERSION as __version__
 
 if TYPE_CHECKING:
-    from quarterdeck.api import export, plan, read_plan, read_scenario, simulate, write_plan
+    from quarterdeck.api import assign, export, plan, read_plan, read_scenario, simulate, write_plan
 
-__all__ = ["__version__", "export", "plan", "read_plan", "read_scenario", "simulate", "write_plan"]
+__all__ = ["__version__", "assign", "export", "plan", "read_plan", "read_scenario", "simulate", "write_plan"]
 
 
 def __getattr__(name: str) -> Any:

@@ -12,7 +12,7 @@ from quarterdeck.geo.scenario import Scenario
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.planfile import plan_text, read_plan
 
-__all__ = ["export", "plan", "plan_text", "read_plan", "read_scenario", "simulate", "write_plan"]
+__all__ = ["assign", "export", "plan", "plan_text", "read_plan", "read_scenario", "simulate", "write_plan"]
 
 
 Method = Literal["stc", "lines", "guards"]
@@ -43,6 +43,13 @@ def plan(scenario: Scenario, *, method: Method | None = None, seed: int = 0, **o
 def default_method(scenario: Scenario) -> Method:
     """Return the method that survey teams expect: lines where a vehicle has a sensor, else spanning trees."""
     return "lines" if any(v.sensor for v in scenario.vehicles) else "stc"
+
+
+def assign(scenario: Scenario, *, seed: int = 0, **options: Any) -> Mission:
+    """Return a mission in which the scenario's vehicles do its tasks (`quarterdeck.mission.assign.assign`)."""
+    from quarterdeck.mission.assign import assign as share_out
+
+    return share_out(scenario, seed=seed, **options)
 
 
 def simulate(mission: Mission, **options: Any) -> Any:

@@ -10,9 +10,9 @@ from quarterdeck.cli.output import emit, force_option, output_option, print_figu
 @output_option
 @click.option("--at", "time", type=click.FloatRange(min=0), required=True, help="Seconds since the mission's start.")
 @click.option("--lost", default="", help="Ids of the vehicles that are lost, with commas; ID@SECONDS: since when.")
-@click.option("--add", metavar="SITE", help="GeoJSON of what is new: obstacles, areas, vehicles that join.")
+@click.option("--add", metavar="SITE", help="GeoJSON of what is new: obstacles, areas, tasks, vehicles that join.")
 @click.option("--gone", default="", help="Ids of obstacles that are no more, with commas.")
-@click.option("--withdrawn", default="", help="Ids of areas that need not be covered any more, with commas.")
+@click.option("--withdrawn", default="", help="Ids of areas and tasks that need not be done any more, with commas.")
 @seed_option
 @force_option
 def command(
@@ -39,6 +39,7 @@ def command(
         joined=added.vehicles if added else (),
         obstacles=added.site.obstacles if added else (),
         areas=added.site.areas if added else (),
+        tasks=added.tasks if added else (),
         gone=frozenset(_ids(gone)),
         withdrawn=frozenset(_ids(withdrawn)),
     )

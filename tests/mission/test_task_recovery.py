@@ -1,0 +1,69 @@
+"""A plan of tasks after losses: nothing done again, all that is left done once, precedence kept."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from quarterdeck.geo.reader import read_scenario
+from quarterdeck.geo.scenario import Precedence, Task
+from quarterdeck.mission.assign import assign
+from quarterdeck.mission.progress import planned_progress
+from quarterdeck.mission.replan import Changes, replan
+
+DATA = Path(__file__).parents[2] / "data"
+
+
+@cache
+def plan():
+    """Return a short search's plan of the hall's five tasks, each with ten seconds of service."""
+    scenario = read_scenario(DATA / "inspection_hall.geojson")
+    tasks = tuple(replace(t, service_time=10.0) for t in scenario.tasks)
+    return assign(replace(scenario, tasks=tasks), iterations=20)
+
+
+def visited(mission):
+    """Return the ids of the tasks on the routes of a mission."""
+    return [w.task for r in mission.routes for w in r.waypoints if w.task]
+
+
+@pytest.mark.parametrize("time", [0.0, 15.0, 30.0])
+def test_the_survivor_does_the_rest(time):
+    """After a loss each task that is not done is on the survivor's route once, and none that is done."""
+    before = plan()
+    progress = planned_progress(before, time)
+    after = replan(before, progress, Changes(lost=frozenset({"r1"})))
+    assert sorted(visited(after)) == sorted({t.id for t in before.tasks} - progress.served)
+    assert [v.id for v in after.vehicles] == ["r2"]
+
+
+def test_all_done_goes_home():
+    """When nothing is left the survivor goes home."""
+    before = plan()
+    after = replan(before, planned_progress(before, 1e4), Changes(lost=frozenset({"r1"})))
+    assert visited(after) == []
+    assert after.feasible
+
+
+def test_a_carried_thing_that_is_lost_is_told():
+    """A task in the same robot as one that a lost robot has done can't be done, nor what comes after it: both are told."""
+    before = plan()
+    route = next(r for r in before.routes if r.vehicle == "r1")
+    done = next(w for w in route.waypoints if w.task)
+    first, *others = [t.id for t in before.tasks if t.id != done.task]
+    tasks = [replace(t, after=(Precedence(done.task, "same_robot"),)) if t.id == first else t for t in before.tasks]
+    tasks = [replace(t, after=(Precedence(first),)) if t.id == others[0] else t for t in tasks]
+    progress = planned_progress(before, done.time + done.hold + 0.1)
+    after = replan(replace(before, tasks=tuple(tasks)), progress, Changes(lost=frozenset({"r1"})))
+    left = {t.id for t in tasks} - progress.served - {first, others[0]}
+    assert sorted(visited(after)) == sorted(left)
+    assert not after.feasible
+    assert any(repr(first) in r for r in after.reasons)
+
+
+def test_a_new_task_is_done():
+    """A task that is added is on somebody's route."""
+    before = plan()
+    after = replan(before, planned_progress(before, 5.0), Changes(tasks=(Task("late", before.tasks[0].position),)))
+    assert "late" in visited(after)
