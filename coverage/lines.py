@@ -7,12 +7,12 @@ and directions, paths link the end of one with the beginning of the next.
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-import numba as nb
 import numpy as np
 import shapely
 from scipy.ndimage import distance_transform_edt
 from shapely import MultiPolygon
 
+from quarterdeck.coverage.line_order import alternate_order, order_from, short_order
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.grid import TOLERANCE, Grid
 from quarterdeck.geo.scenario import as_multipolygon
@@ -100,18 +100,24 @@ def lay_lines(
     cross_every: int = 0,
     turn_cost: float | None = None,
     start: tuple[float, float] | None = None,
+    entry: tuple[float, float] | None = None,
+    alternate: int = 0,
 ) -> Lines:
     """Cover `part` of `area` by parallel lines at most `spacing` metres apart, and link them on `road`.
 
     `angle` is the lines' direction in radians counter-clockwise from east (None: the cheapest, with `turn_cost` metres for
     each line, by default the spacing). Lines reach as far as the strip does that they survey, never out of `area`.
     `run` metres are driven straight before and after each line where the road allows. `cross_every` n > 0 adds lines
-    across, n spacings apart. The route begins near `start`. Raises InputError if an option is out of range.
+    across, n spacings apart. The route begins near `start`, or with the end of a line that is nearest to `entry`.
+    `alternate` n > 1 drives every nth line and the skipped ones on the way back; it begins with an outermost line.
+    Raises InputError if an option is out of range.
     """
     if not (np.isfinite(spacing) and spacing > 0):
         raise InputError(f"spacing {spacing:g} must be a positive number of metres")
     if not run >= 0 or cross_every < 0:
         raise InputError(f"run {run:g} m and cross_every {cross_every} must not be negative")
+    if alternate < 0 or alternate == 1:
+        raise InputError(f"alternate {alternate} must be 2 or more, or 0 for lines in a short order")
     turn_cost = spacing if turn_cost is None else turn_cost
     if part.is_empty:
         return Lines((), (), angle or 0.0)
@@ -120,8 +126,9 @@ def lay_lines(
     pieces = _pieces(area, part, spacing, angle)
     cross = _pieces(area, part, cross_every * spacing, angle + np.pi / 2) if cross_every else np.zeros((0, 2, 2))
     swaths = [*_swaths(pieces, road, run, "L", False), *_swaths(cross, road, run, "X", True)]
-    begin = None if start is None else np.array(start)
-    return _linked(_routed(swaths[: len(pieces)], begin) + _routed(swaths[len(pieces) :], None), road, angle)
+    lines, across = swaths[: len(pieces)], swaths[len(pieces) :]
+    route = _routed(lines, pieces, start, entry, alternate) + _routed(across, cross, None, None, alternate)
+    return _linked(route, road, angle)
 
 
 def _best_angle(area: MultiPolygon, part: MultiPolygon, spacing: float, turn_cost: float) -> float:
@@ -191,59 +198,37 @@ def _run(points: np.ndarray, direction: np.ndarray, run: float, road: Roadmap) -
     return points + reach[:, None] * direction
 
 
-def _routed(swaths: list[Swath], start: np.ndarray | None) -> list[Swath]:
-    """Return the swaths in a short order with their directions: the nearest next, then improved by reversals (2-opt)."""
+def _routed(
+    swaths: list[Swath],
+    pieces: np.ndarray,
+    start: tuple[float, float] | None,
+    entry: tuple[float, float] | None,
+    alternate: int,
+) -> list[Swath]:
+    """Return the swaths, which survey the (n, 2, 2) `pieces`, in the order and the directions in which they are driven."""
     if not swaths:
         return []
     ends = np.array([[s.run_in, s.run_out] for s in swaths])
-    first = ends[0, 0] if start is None else start
-    order, forward = _short_order(ends, first)
+    begin = np.array(entry or start or swaths[0].run_in)
+    if alternate:
+        order, forward = alternate_order(ends, _rows(pieces), alternate, begin)
+    elif entry is not None:
+        order, forward = order_from(ends, pieces, begin)
+    else:
+        order, forward = short_order(ends, begin)
     return [swaths[i] if f else _reversed(swaths[i]) for i, f in zip(order.tolist(), forward.tolist(), strict=True)]
+
+
+def _rows(pieces: np.ndarray) -> np.ndarray:
+    """Return the number (n,) of the line on which each of the (n, 2, 2) pieces lies; they come line after line."""
+    along = pieces[0, 1] - pieces[0, 0]
+    along = along / np.linalg.norm(along)
+    offset = pieces[:, 0] @ np.array([-along[1], along[0]])
+    return np.append(0, np.cumsum(np.diff(offset) > 1e-6))
 
 
 def _reversed(s: Swath) -> Swath:
     return replace(s, start=s.end, end=s.start, run_in=s.run_out, run_out=s.run_in)
-
-
-@nb.njit(cache=True)
-def _short_order(ends: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the order of lines and whether each is driven forward; `ends` (n, 2, 2) are first and last points."""
-    n = len(ends)
-    order, forward = np.empty(n, np.int64), np.empty(n, np.bool_)
-    left = np.ones(n, np.bool_)
-    x, y = start[0], start[1]
-    for k in range(n):
-        best, at, side = np.inf, -1, 0
-        for i in range(n):
-            if left[i]:
-                for e in range(2):
-                    d = np.hypot(ends[i, e, 0] - x, ends[i, e, 1] - y)
-                    if d < best - 1e-9:
-                        best, at, side = d, i, e
-        order[k], forward[k], left[at] = at, side == 0, False
-        x, y = ends[at, 1 - side, 0], ends[at, 1 - side, 1]
-    for _ in range(50):
-        improved = False
-        for i in range(n - 1):
-            for j in range(i + 1, n):
-                # reverse i .. j: the links before i and after j change, the ends of those turn round
-                a = ends[order[i], 0 if forward[i] else 1]
-                b = ends[order[j], 1 if forward[j] else 0]
-                px, py = start[0], start[1]
-                if i > 0:
-                    before = ends[order[i - 1], 1 if forward[i - 1] else 0]
-                    px, py = before[0], before[1]
-                gain = np.hypot(a[0] - px, a[1] - py) - np.hypot(b[0] - px, b[1] - py)
-                if j + 1 < n:
-                    after = ends[order[j + 1], 0 if forward[j + 1] else 1]
-                    gain += np.hypot(b[0] - after[0], b[1] - after[1]) - np.hypot(a[0] - after[0], a[1] - after[1])
-                if gain > 1e-6:
-                    order[i : j + 1] = order[i : j + 1][::-1].copy()
-                    forward[i : j + 1] = ~forward[i : j + 1][::-1].copy()
-                    improved = True
-        if not improved:
-            break
-    return order, forward
 
 
 def _linked(swaths: Iterable[Swath], road: Roadmap, angle: float) -> Lines:

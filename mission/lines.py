@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 from shapely import LineString
@@ -26,12 +27,15 @@ def plan_lines(
     angle: float | None = None,
     run: float = 0.0,
     cross_every: int = 0,
+    entry: tuple[float, float] | None = None,
+    alternate: int = 0,
 ) -> Mission:
     """Return the mission that surveys the scenario's areas by parallel lines, `spacing` metres apart.
 
     `angle` is the lines' direction in radians counter-clockwise from east (None: each vehicle's cheapest), `run` the metres
-    driven straight before and after each line, `cross_every` n > 0 adds lines across, n spacings apart. Raises
-    InputError as `cover` does.
+    driven straight before and after each line, `cross_every` n > 0 adds lines across, n spacings apart. Each
+    vehicle's lines begin at the end nearest to `entry`, (x, y) metres (None: where the way is short). `alternate` n > 1
+    drives every nth line and the skipped ones on the way back. Raises InputError as `cover` does.
     """
     step = covering(scenario, spacing)
     area = trackable(scenario, step)
@@ -42,8 +46,15 @@ def plan_lines(
     for i, region in enumerate(regions):
         labels[region.mask] = i
     parts = split_area(area, grid, labels, len(vehicles))
+    habits: dict[str, Any] = {
+        "angle": angle,
+        "run": run,
+        "cross_every": cross_every,
+        "entry": entry,
+        "alternate": alternate,
+    }
     laid = [
-        lay_lines(area, part, step, road, angle=angle, run=run, cross_every=cross_every, start=v.start)
+        lay_lines(area, part, step, road, start=v.start, **habits)
         for v, part, road in zip(vehicles, parts, roads, strict=True)
     ]
     ways = [_way(v, lines, road) for v, lines, road in zip(vehicles, laid, roads, strict=True)]
@@ -69,7 +80,7 @@ def plan_lines(
         vehicles=vehicles,
         routes=routes,
         method="lines",
-        parameters={"spacing": step, "angle": angle, "run": run, "cross_every": cross_every},
+        parameters={"spacing": step} | habits,
         seed=seed,
         spacing=step,
         tasks=scenario.tasks,

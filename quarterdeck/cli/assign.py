@@ -3,37 +3,17 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from quarterdeck.cli.output import console, emit, force_option, minutes, output_option, seed_option
+from quarterdeck.cli.parameters import Numbers
 
 if TYPE_CHECKING:
     from quarterdeck.geo.scenario import Scenario
     from quarterdeck.mission.mission import Mission
-
-
-class Numbers(click.ParamType):
-    """So many numbers with commas."""
-
-    def __init__(self, name: str, *counts: int) -> None:
-        self.name = name
-        self.counts = counts
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
-        """Return the numbers."""
-        if isinstance(value, tuple):
-            return value
-        try:
-            numbers = tuple(float(part) for part in value.split(","))
-        except ValueError:
-            self.fail(f"{value!r} is not {self.name}: numbers with commas", param, ctx)
-        if len(numbers) not in self.counts or not all(map(math.isfinite, numbers)):
-            self.fail(f"{value!r} is not {self.name}", param, ctx)
-        return numbers
 
 
 class PriorityFunction(click.ParamType):

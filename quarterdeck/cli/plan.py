@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from quarterdeck.cli.output import emit, force_option, output_option, print_figures, seed_option
+from quarterdeck.cli.parameters import Numbers
 
 if TYPE_CHECKING:
     from quarterdeck.api import Method
+    from quarterdeck.geo.frame import Frame
 
 OPTIONS = {
     "stc": ("spacing", "placement", "angle", "edge"),
-    "lines": ("spacing", "angle", "run", "cross_every"),
+    "lines": ("spacing", "angle", "run", "cross_every", "entry", "alternate"),
     "guards": ("range", "mode", "inspect"),
 }
 
@@ -31,7 +33,10 @@ OPTIONS = {
 @click.option("--edge", type=click.Choice(["whole", "cells", "lap"]),
               help="stc: how far tracks reach: whole 2 x 2 cells, every free cell (default), or laps too.")  # fmt: skip
 @click.option("--run", type=float, help="lines: metres driven straight before and after each line.")
-@click.option("--cross-every", type=int, help="lines: add lines across, so many spacings apart.")
+@click.option("--cross-every", type=int, help="lines: add lines across, so many spacings apart (1: a crosshatch).")
+@click.option("--entry", type=Numbers("LON,LAT", 2), help="lines: begin at the end of a line nearest to this point.")
+@click.option("--alternate", type=click.IntRange(min=2), metavar="N",
+              help="lines: drive every Nth line first, the skipped ones on the way back: room for wide turns.")  # fmt: skip
 @click.option("--range", type=float, help="guards: metres that vehicles see which have no range of their own.")
 @click.option("--mode", type=click.Choice(["optimised", "paper"]), help="guards: as the paper, or better (default).")
 @click.option(
@@ -52,6 +57,8 @@ def command(site: str, output: str, method: "Method | None", seed: int, as_json:
             raise click.UsageError(f"--{name.replace('_', '-')} does not belong to --method {method}")
     if "angle" in given:
         given["angle"] = math.radians(90.0 - given["angle"])
+    if "entry" in given:
+        given["entry"] = _entry(given["entry"], scenario.frame)
     mission = plan(scenario, method=method, seed=seed, **given)
     text = plan_text(mission)
     emit(text, output, force=force)
@@ -61,3 +68,19 @@ def command(site: str, output: str, method: "Method | None", seed: int, as_json:
     else:
         print_figures(mission)
     return 0 if mission.feasible else 1
+
+
+def _entry(lonlat: tuple[float, float], frame: "Frame") -> tuple[float, float]:
+    """Return the point in metres. Raises InputError if it is no place near the site."""
+    import numpy as np
+
+    from quarterdeck.geo.errors import InputError
+    from quarterdeck.geo.geojson import position_problem
+    from quarterdeck.geo.reader import MAX_RADIUS
+
+    if problem := position_problem(list(lonlat)):
+        raise InputError(f"--entry: {problem}")
+    x, y = frame.to_metres(np.array(lonlat))[0]
+    if not math.hypot(x, y) <= MAX_RADIUS:
+        raise InputError(f"--entry: is more than {MAX_RADIUS / 1000:.0f} km from the site's centre; give LON,LAT near it")
+    return float(x), float(y)

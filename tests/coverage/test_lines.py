@@ -126,3 +126,44 @@ def test_nobodys_area_and_wrong_options():
         lay_lines(FIELD, FIELD, 10.0, roadmap(FIELD), run=-1.0)
     with pytest.raises(InputError, match="positive"):
         lay_lines(FIELD, FIELD, 0.0, roadmap(FIELD))
+
+
+@settings(deadline=None, max_examples=25)
+@given(areas(), st.floats(0, 3.14), st.tuples(st.floats(-150, 150), st.floats(-150, 150)))
+def test_entry_is_the_nearest_end(area, angle, entry):
+    """No end of any line is nearer to the entry point than where the first begins, and all lines are still driven."""
+    lines = lay_lines(area, area, 10.0, roadmap(area), angle=angle, run=5.0, start=(0.0, 0.0), entry=entry)
+    ends = np.concatenate(lines.tracks)
+    nearest = np.linalg.norm(ends - entry, axis=1).min()
+    assert np.hypot(*np.subtract(lines.swaths[0].start, entry)) == pytest.approx(nearest)
+    assert len(lines.swaths) == len(lay_lines(area, area, 10.0, roadmap(area), angle=angle).swaths)
+
+
+@pytest.mark.parametrize("corner", [(0.0, 0.0), (100.0, 0.0), (0.0, 60.0), (100.0, 60.0)])
+def test_alternate_lines_leave_room_to_turn(corner):
+    """Six lines, every second first: 1, 3, 5 out, 6, 4, 2 back, to and fro, from the corner nearest to the entry."""
+    lines = lay_lines(FIELD, FIELD, 10.0, roadmap(FIELD), angle=0.0, entry=corner, alternate=2)
+    y = [s.start[1] if corner[1] == 0 else 60.0 - s.start[1] for s in lines.swaths]
+    assert y == pytest.approx([5, 25, 45, 55, 35, 15])
+    assert [s.start[0] for s in lines.swaths] == pytest.approx([corner[0], 100.0 - corner[0]] * 3, abs=1e-3)
+
+
+@settings(deadline=None, max_examples=15)
+@given(areas(), st.floats(0, 3.14), st.integers(2, 5))
+def test_alternate_drives_every_line_once(area, angle, n):
+    """The same lines as without, each once; within a pass the next line is n lines on, so that a circle fits."""
+    road = roadmap(area)
+    lines = lay_lines(area, area, 10.0, road, angle=angle, alternate=n)
+    assert {s.name for s in lines.swaths} == {s.name for s in lay_lines(area, area, 10.0, road, angle=angle).swaths}
+    across = np.array([-np.sin(angle), np.cos(angle)])
+    offset = np.array([np.dot(s.start, across) for s in lines.swaths])
+    jumps = np.abs(np.diff(offset))
+    height = np.diff(np.unique(np.round(offset, 5))).min(initial=np.inf)
+    near = (jumps > 1e-5) & (jumps < (n - 0.01) * height)
+    assert near.sum() <= n - 1  # where one pass ends and the next begins
+
+
+def test_alternate_of_one_is_refused():
+    """Every line first is no order of its own."""
+    with pytest.raises(InputError, match="2 or more"):
+        lay_lines(FIELD, FIELD, 10.0, roadmap(FIELD), alternate=1)

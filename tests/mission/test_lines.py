@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quarterdeck.api import default_method, plan
+from quarterdeck.api import default_method, plan, read_plan
+from quarterdeck.cli import main
 from quarterdeck.geo.reader import read_scenario
 from quarterdeck.geo.scenario import Sensor
 from quarterdeck.mission.check import trespasses
@@ -44,3 +45,32 @@ def test_a_sensor_selects_lines():
     mission = plan(surveying)
     assert mission.method == "lines"
     assert mission.spacing == 30.0
+
+
+def status(command):
+    """Return what the command line exits with."""
+    with pytest.raises(SystemExit) as stop:
+        main(command)
+    return stop.value.code
+
+
+def test_entry_and_alternate_from_the_command_line(tmp_path, capsys):
+    """The plan's first survey leg begins at the end of a line nearest to --entry; a wrong one is refused in one line."""
+    site, out = DATA / "west_ant_island.geojson", tmp_path / "plan.geojson"
+    scenario = read_scenario(site)
+    area = scenario.site.area.bounds
+    lon, lat = scenario.frame.to_degrees([area[2:]])[0]
+    command = ["plan", str(site), "--method", "lines", "--spacing", "400", "-o", str(out)]
+    assert status([*command, "--entry", f"{lon},{lat}"]) == 0
+    mission = read_plan(out)
+    for route in mission.routes:
+        own = [g for g, p in zip(mission.layers[0].geometries, mission.layers[0].properties, strict=True)
+               if p["vehicle"] == route.vehicle]  # fmt: skip
+        ends = np.array([g.coords for g in own])
+        first = route.xyz[np.flatnonzero(route.survey)[0] - 1, :2]
+        assert np.hypot(*(first - area[2:])) == pytest.approx(np.linalg.norm(ends - area[2:], axis=2).min(), abs=0.1)
+    for wrong in (["--entry", f"{lat},{lon}"], ["--entry", "0,0"], ["--entry", "5"], ["--alternate", "1"]):
+        assert status([*command, "--force", *wrong]) == 2
+    capsys.readouterr()
+    assert status([*command, "--force", "--method", "stc", "--alternate", "2"]) == 2
+    assert "--alternate does not belong to --method stc" in capsys.readouterr().err
