@@ -12,6 +12,7 @@ import shapely
 from scipy.ndimage import distance_transform_edt
 from shapely import MultiPolygon
 
+from quarterdeck.coverage.laps import lay_laps
 from quarterdeck.coverage.line_order import alternate_order, order_from, short_order
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.grid import TOLERANCE, Grid
@@ -45,26 +46,32 @@ class Swath:
 class Lines:
     """One vehicle's swaths in the order in which they are driven, and the (n, 2) paths between them in metres.
 
-    `links[i]` leads from the run-out of swath i to the run-in of swath i + 1; `angle` is the lines' direction in radians.
-    `unreached` counts pieces of lines that no path leads to.
+    `laps`, (n, 2) metres, come before them. `links[i]` leads from the end of lap or swath i, run-out included, to where the
+    next begins, run-in included; `angle` is the lines' direction in radians. `unreached` counts what no path leads to.
     """
 
     swaths: tuple[Swath, ...]
     links: tuple[np.ndarray, ...]
     angle: float
     unreached: int = 0
+    laps: tuple[np.ndarray, ...] = ()
 
     @property
     def tracks(self) -> list[np.ndarray]:
-        """The (2, 2) lines that survey, in order."""
-        return [np.array([s.start, s.end]) for s in self.swaths]
+        """The (n, 2) laps and (2, 2) lines that survey, in order."""
+        return [*self.laps, *(np.array([s.start, s.end]) for s in self.swaths)]
+
+    @property
+    def driven(self) -> list[np.ndarray]:
+        """The (n, 2) laps, and the (4, 2) lines with their run-ins and run-outs, in order."""
+        return [*self.laps, *(np.array([s.run_in, s.start, s.end, s.run_out]) for s in self.swaths)]
 
     @property
     def path(self) -> np.ndarray:
-        """The (n, 2) metres of all of it: run-ins, swaths, run-outs and links in order."""
+        """The (n, 2) metres of all of it: laps, run-ins, swaths, run-outs and links in order."""
         parts: list[np.ndarray] = []
-        for i, s in enumerate(self.swaths):
-            parts.append(np.array([s.run_in, s.start, s.end, s.run_out]))
+        for i, track in enumerate(self.driven):
+            parts.append(track)
             parts += [link[1:-1] for link in self.links[i : i + 1]]
         return np.concatenate(parts) if parts else np.zeros((0, 2))
 
@@ -102,6 +109,7 @@ def lay_lines(
     start: tuple[float, float] | None = None,
     entry: tuple[float, float] | None = None,
     alternate: int = 0,
+    lap: MultiPolygon | None = None,
 ) -> Lines:
     """Cover `part` of `area` by parallel lines at most `spacing` metres apart, and link them on `road`.
 
@@ -110,6 +118,7 @@ def lay_lines(
     `run` metres are driven straight before and after each line where the road allows. `cross_every` n > 0 adds lines
     across, n spacings apart. The route begins near `start`, or with the end of a line that is nearest to `entry`.
     `alternate` n > 1 drives every nth line and the skipped ones on the way back; it begins with an outermost line.
+    The boundary of `lap` that lies in the part (`coverage.laps.lap_space`) is driven before all lines.
     Raises InputError if an option is out of range.
     """
     if not (np.isfinite(spacing) and spacing > 0):
@@ -127,8 +136,11 @@ def lay_lines(
     cross = _pieces(area, part, cross_every * spacing, angle + np.pi / 2) if cross_every else np.zeros((0, 2, 2))
     swaths = [*_swaths(pieces, road, run, "L", False), *_swaths(cross, road, run, "X", True)]
     lines, across = swaths[: len(pieces)], swaths[len(pieces) :]
+    laps = [] if lap is None else lay_laps(lap, part, spacing, entry or start)
+    if laps:
+        start = (float(laps[-1][-1, 0]), float(laps[-1][-1, 1]))
     route = _routed(lines, pieces, start, entry, alternate) + _routed(across, cross, None, None, alternate)
-    return _linked(route, road, angle)
+    return _linked(laps, route, road, angle)
 
 
 def _best_angle(area: MultiPolygon, part: MultiPolygon, spacing: float, turn_cost: float) -> float:
@@ -231,17 +243,24 @@ def _reversed(s: Swath) -> Swath:
     return replace(s, start=s.end, end=s.start, run_in=s.run_out, run_out=s.run_in)
 
 
-def _linked(swaths: Iterable[Swath], road: Roadmap, angle: float) -> Lines:
-    """Return the swaths with shortest paths between them; those that no path leads to from the first are left out."""
-    kept: list[Swath] = []
+def _linked(laps: Iterable[np.ndarray], swaths: Iterable[Swath], road: Roadmap, angle: float) -> Lines:
+    """Return laps and swaths with shortest paths between them; those that no path leads to from the first are left out."""
+    driven, kept = [], []  # type: list[np.ndarray], list[Swath]
     links: list[np.ndarray] = []
     unreached = 0
-    for swath in swaths:
-        if kept:
-            link = shortest_path(road, kept[-1].run_out, swath.run_in)
+    here: tuple[float, float] | None = None
+    ways: list[np.ndarray | Swath] = [*laps, *swaths]
+    for way in ways:
+        begin, end = (way.run_in, way.run_out) if isinstance(way, Swath) else (tuple(way[0]), tuple(way[-1]))
+        if here is not None:
+            link = shortest_path(road, here, begin)
             if link is None:
                 unreached += 1
                 continue
             links.append(link)
-        kept.append(swath)
-    return Lines(tuple(kept), tuple(links), float(angle), unreached)
+        here = end
+        if isinstance(way, Swath):
+            kept.append(way)
+        else:
+            driven.append(way)
+    return Lines(tuple(kept), tuple(links), float(angle), unreached, tuple(driven))

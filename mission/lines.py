@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from shapely import LineString
 
+from quarterdeck.coverage.laps import lap_space
 from quarterdeck.coverage.lines import Lines, lay_lines, split_area
 from quarterdeck.coverage.metrics import measure
 from quarterdeck.coverage.placement import place
@@ -29,13 +30,15 @@ def plan_lines(
     cross_every: int = 0,
     entry: tuple[float, float] | None = None,
     alternate: int = 0,
+    lap: bool = False,
 ) -> Mission:
     """Return the mission that surveys the scenario's areas by parallel lines, `spacing` metres apart.
 
     `angle` is the lines' direction in radians counter-clockwise from east (None: each vehicle's cheapest), `run` the metres
     driven straight before and after each line, `cross_every` n > 0 adds lines across, n spacings apart. Each
     vehicle's lines begin at the end nearest to `entry`, (x, y) metres (None: where the way is short). `alternate` n > 1
-    drives every nth line and the skipped ones on the way back. Raises InputError as `cover` does.
+    drives every nth line and the skipped ones on the way back. `lap`: before the lines, each drives what is in its part of
+    one lap along the border and around obstacles, half a spacing in. Raises InputError as `cover` does.
     """
     step = covering(scenario, spacing)
     area = trackable(scenario, step)
@@ -53,8 +56,9 @@ def plan_lines(
         "entry": entry,
         "alternate": alternate,
     }
+    space = lap_space(scenario.site.coverable, area, step) if lap else None
     laid = [
-        lay_lines(area, part, step, road, start=v.start, **habits)
+        lay_lines(area, part, step, road, start=v.start, lap=space, **habits)
         for v, part, road in zip(vehicles, parts, roads, strict=True)
     ]
     ways = [_way(v, lines, road) for v, lines, road in zip(vehicles, laid, roads, strict=True)]
@@ -69,6 +73,7 @@ def plan_lines(
     del figures["turns"], figures["turns_per_1000_m2"], figures["cell_poc"]  # of lanes of a grid; there is none here
     figures |= {
         "lines": sum(len(lines.swaths) for lines in laid),
+        "laps": sum(len(lines.laps) for lines in laid),
         "makespan": max(r.duration for r in routes),
         "energy": sum(r.energy for r in routes),
         "notes": notes,
@@ -80,7 +85,7 @@ def plan_lines(
         vehicles=vehicles,
         routes=routes,
         method="lines",
-        parameters={"spacing": step} | habits,
+        parameters={"spacing": step} | habits | {"lap": lap},
         seed=seed,
         spacing=step,
         tasks=scenario.tasks,
@@ -96,18 +101,20 @@ def _way(vehicle: Vehicle, lines: Lines, road: Roadmap) -> tuple[np.ndarray, lis
     """Return (n, 2) metres out, along all lines with their runs and links, and home; the kind of each leg; what fails."""
     points: list[tuple[float, float]] = [vehicle.start]
     legs: list[Leg] = ["start"]
-    if not lines.swaths:
+    tracks = lines.driven
+    if not tracks:
         return np.array(points), legs, []
-    way_out = shortest_paths(road, np.array(vehicle.start), np.array(lines.swaths[0].run_in))[1][0][0]
-    way_home = shortest_paths(road, np.array(lines.swaths[-1].run_out), np.array(vehicle.home))[1][0][0]
+    way_out = shortest_paths(road, np.array(vehicle.start), tracks[0][0])[1][0][0]
+    way_home = shortest_paths(road, tracks[-1][-1], np.array(vehicle.home))[1][0][0]
     if way_out is None or way_home is None:
         return np.array(points), legs, [f"{vehicle.id}: no way between its start, its region and its end; move them"]
     links = [way_out, *lines.links, way_home]
-    for link, swath in zip(links, lines.swaths, strict=False):
-        for point in [*link[1:].tolist(), swath.start]:
+    for i, (link, track) in enumerate(zip(links, tracks, strict=False)):
+        for point in link[1:].tolist():
             _add(points, legs, point, "transit")
-        _add(points, legs, swath.end, "survey")
-        _add(points, legs, swath.run_out, "transit")
+        kinds: list[Leg] = ["survey"] * (len(track) - 1) if i < len(lines.laps) else ["transit", "survey", "transit"]
+        for point, kind in zip(track[1:].tolist(), kinds, strict=True):
+            _add(points, legs, point, kind)
     for point in way_home[1:].tolist():
         _add(points, legs, point, "transit")
     return np.array(points), legs, []
@@ -120,7 +127,10 @@ def _add(points: list[tuple[float, float]], legs: list[Leg], point: Sequence[flo
 
 
 def _named(vehicles: Sequence[Vehicle], laid: Sequence[Lines]) -> Layer:
-    """Return the lines with their names, for the eye and for the log."""
+    """Return the lines with their names, for the eye and for the log; laps are P1, P2, ... (perimeter)."""
+    laps = [(v.id, f"P{n + 1}", lap) for v, own in zip(vehicles, laid, strict=True) for n, lap in enumerate(own.laps)]
     swaths = [(v.id, s) for v, lines in zip(vehicles, laid, strict=True) for s in lines.swaths]
-    properties = tuple({"name": s.name, "vehicle": owner, "cross": s.cross} for owner, s in swaths)
-    return Layer("line", tuple(LineString([s.start, s.end]) for _, s in swaths), properties)
+    properties = [{"name": name, "vehicle": owner, "cross": False, "lap": True} for owner, name, _ in laps]
+    properties += [{"name": s.name, "vehicle": owner, "cross": s.cross} for owner, s in swaths]
+    shapes = [*(LineString(lap) for _, _, lap in laps), *(LineString([s.start, s.end]) for _, s in swaths)]
+    return Layer("line", tuple(shapes), tuple(properties))

@@ -67,6 +67,7 @@ WORDS = {
     "hypervertices": ("hypervertices", "{:,.0f}", 1.0),
     "share_error_hypervertices": ("largest share error", "{:.2f} hypervertices", 1.0),
     "lines": ("lines", "{:,.0f}", 1.0),
+    "laps": ("laps", "{:,.0f}", 1.0),
     "turns": ("turns", "{:,.0f}", 1.0),
     "length": ("survey length", "{:.2f} km", 0.001),
     "overlap": ("overlap", "{:.1f} %", 100.0),

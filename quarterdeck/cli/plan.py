@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 OPTIONS = {
     "stc": ("spacing", "placement", "angle", "edge"),
-    "lines": ("spacing", "angle", "run", "cross_every", "entry", "alternate"),
+    "lines": ("spacing", "angle", "run", "cross_every", "entry", "alternate", "lap"),
     "guards": ("range", "mode", "inspect"),
 }
 
@@ -37,6 +37,8 @@ OPTIONS = {
 @click.option("--entry", type=Numbers("LON,LAT", 2), help="lines: begin at the end of a line nearest to this point.")
 @click.option("--alternate", type=click.IntRange(min=2), metavar="N",
               help="lines: drive every Nth line first, the skipped ones on the way back: room for wide turns.")  # fmt: skip
+@click.option("--lap", is_flag=True, default=None,
+              help="lines: first one lap along the border and around obstacles, half a spacing in.")  # fmt: skip
 @click.option("--range", type=float, help="guards: metres that vehicles see which have no range of their own.")
 @click.option("--mode", type=click.Choice(["optimised", "paper"]), help="guards: as the paper, or better (default).")
 @click.option(

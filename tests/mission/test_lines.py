@@ -74,3 +74,15 @@ def test_entry_and_alternate_from_the_command_line(tmp_path, capsys):
     capsys.readouterr()
     assert status([*command, "--force", "--method", "stc", "--alternate", "2"]) == 2
     assert "--alternate does not belong to --method stc" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("site", ["farm_survey", "dalian_harbour"])
+def test_a_lap_covers_the_edge(site):
+    """Laps stay inside, come first, have names of their own, and leave less uncovered."""
+    scenario = read_scenario(DATA / f"{site}.geojson")
+    mission, without = plan_lines(scenario, angle=0.5, lap=True), plan_lines(scenario, angle=0.5)
+    assert not trespasses(mission)
+    assert mission.figures["laps"] >= len(scenario.vehicles)
+    assert 1 - mission.figures["poc"] < 0.5 * (1 - without.figures["poc"])
+    names = [(p["vehicle"], p["name"]) for p in mission.layers[0].properties]
+    assert len(names) == len(set(names)) == mission.figures["lines"] + mission.figures["laps"]
