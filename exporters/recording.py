@@ -56,7 +56,7 @@ def recording(mission: Mission, trace: Trace | None = None) -> bytes:
 def _driven(stream: rr.RecordingStream, mission: Mission, trace: Trace, i: int, rgb: list[int]) -> None:
     name = trace.vehicles[i]
     kept = slice(None, None, max(1, -(-len(trace.time) // SAMPLES)))
-    xyz = np.column_stack([trace.x[kept, i], trace.y[kept, i], trace.z[kept, i]])
+    xyz = np.column_stack([trace.x[kept, i], trace.y[kept, i], trace.z[kept, i] + trace.ground[kept, i]])
     _line(stream, mission, f"driven/{name}", xyz, rgb)
     _moving(stream, mission, f"vehicles/{name}", trace.time[kept], xyz, rgb)
     index = [rr.TimeColumn(TIMELINE, duration=trace.time[kept])]

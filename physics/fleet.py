@@ -169,6 +169,8 @@ class Rovers(Squad):
         self.state[:, :2], self.state[:, rover.PSI] = position[:, :2], heading
         self.ground = np.random.default_rng(self.seed)
         self.speed, self.turn = np.zeros(len(heading)), np.zeros(len(heading))
+        self.pitch = np.zeros(len(heading))
+        self.climb: np.ndarray | None = None  # what slopes need to be known; None on flat ground
 
     def guide(self, time: float, step: float) -> None:
         speed = self.state[:, [rover.LEFT, rover.RIGHT]].mean(axis=1)
@@ -179,7 +181,13 @@ class Rovers(Squad):
     def drive(self, step: float, current: np.ndarray, wind: np.ndarray) -> None:
         rough = self.parameters["roughness"][:, None] * self.ground.standard_normal((len(self.state), 2))
         scale = self.scale * (1.0 + rough)
-        rover.drive_rovers(self.state, self.parameters, self.active, self.speed, self.turn, scale, step)
+        if self.climb is None:
+            rover.drive_rovers(self.state, self.parameters, self.active, self.speed, self.turn, scale, step)
+            return
+        before = self.state.copy()
+        speed = rover.slowed(self.parameters, self.climb, self.speed, self.pitch)
+        rover.drive_rovers(self.state, self.parameters, self.active, speed, self.turn, scale, step)
+        rover.climb(before, self.state, self.parameters, self.climb, self.pitch, self.active, step)
 
     def pose(self) -> tuple[np.ndarray, np.ndarray]:
         return np.column_stack([self.state[:, :2], np.zeros(len(self.state))]), self.state[:, rover.PSI]

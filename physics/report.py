@@ -151,12 +151,14 @@ def measure(
     limits: Mapping[str, float],
     settings: Mapping[str, Any],
     lost: Sequence[bool] | None = None,
+    trouble: Sequence[str] = (),
     localisation: Sequence[Mapping[str, Any]] | None = None,
 ) -> Report:
     """Measure a trace against the mission and judge it.
 
-    `finished` and `aground` are (k,), `served` the times at which tasks were, `lost` (k,) the vehicles lost by a
-    fault (default: none), `localisation` what `Senses.report` returns. Raises InputError for an unknown limit.
+    `finished` and `aground` are (k,), `served` the times at which tasks were, `lost` (k,) the vehicles lost by a fault
+    (default: none), `trouble` what made vehicles give up, a line each, `localisation` what `Senses.report` returns.
+    Raises InputError for an unknown limit.
     """
     allowed = check_limits(limits)
     size = np.array([np.hypot(v.model.length, v.model.width) for v in mission.vehicles])
@@ -171,7 +173,7 @@ def measure(
     places = [None if localisation is None else Localisation(**localisation[i]) for i in range(len(vehicles))]
     vehicles = tuple(replace(v, lost=g, localisation=p) for v, g, p in zip(vehicles, gone, places, strict=True))
     figures = _figures(mission, trace, vehicles, served)
-    reasons = _reasons(mission, vehicles, figures, allowed)
+    reasons = [*trouble, *_reasons(mission, vehicles, figures, allowed)]
     return Report(mission.name, VERSION, settings, allowed, figures, vehicles, tuple(reasons), trace.hash)
 
 

@@ -54,6 +54,55 @@ def rover_parameters(model: VehicleModel) -> np.ndarray:
     return p
 
 
+CLIMB = np.dtype([("mass", float), ("efficiency", float), ("gradeability", float)])
+GRAVITY = 9.81  # m/s2
+
+
+def climb_parameters(model: VehicleModel) -> np.ndarray:
+    """Return the () record of CLIMB of a ground model, gradeability in radians.
+
+    Raises InputError if [dynamics] lacks a figure.
+    """
+    c = np.zeros((), CLIMB)
+    c["mass"], c["efficiency"] = number(model, "mass", least=1e-3), number(model, "efficiency", least=0.01)
+    c["gradeability"] = np.radians(number(model, "gradeability", least=0.0))
+    if c["efficiency"] > 1:
+        raise InputError(f"vehicle model {model.name!r}: [dynamics] efficiency must be from 0.01 to 1")
+    return c
+
+
+def slowed(p: np.ndarray, c: np.ndarray, speed: np.ndarray, pitch: np.ndarray) -> np.ndarray:
+    """Return (k,) m/s: `speed`, or less where the climb of `pitch` (k,) radians takes more than the motors give.
+
+    They give what full wheel speed takes on flat ground. Climbing takes m g v sin(pitch) / efficiency beside.
+    """
+    full = p["watts"] * (p["wheel_speed"] / p["cruise"]) ** p["exponent"]
+    weight = c["mass"] * GRAVITY * np.maximum(np.sin(pitch) * np.sign(speed), 0.0) / c["efficiency"]
+    low, high = np.zeros(len(p)), np.abs(speed)
+    fits = p["watts"] * (high / p["cruise"]) ** p["exponent"] + weight * high <= full
+    for _ in range(40):  # what is taken grows with the speed
+        middle = (low + high) / 2
+        enough = p["watts"] * (middle / p["cruise"]) ** p["exponent"] + weight * middle <= full
+        low, high = np.where(enough, middle, low), np.where(enough, high, middle)
+    return np.where(fits | (weight == 0), speed, np.sign(speed) * low)
+
+
+def climb(
+    before: np.ndarray, state: np.ndarray, p: np.ndarray, c: np.ndarray, pitch: np.ndarray, active: np.ndarray, step: float
+) -> None:
+    """Put on the slope, in place, what `drive_rovers` did as on flat ground in `step` seconds from `before` (k, COLUMNS).
+
+    The way is along the slope, so its plan is shorter. Climbing adds m g v sin(pitch) / efficiency to the power; going
+    down takes as much of m g v sin(pitch) off it as the wheels need: nothing goes back to the battery.
+    """
+    state[:, :2] -= (state[:, :2] - before[:, :2]) * (1.0 - np.cos(pitch))[:, None]
+    speed = (state[:, LEFT] + state[:, RIGHT] + before[:, LEFT] + before[:, RIGHT]) / 4
+    power = c["mass"] * GRAVITY * speed * np.sin(pitch)
+    wheels = np.maximum(state[:, ENERGY] - before[:, ENERGY] - p["idle"] * step / 3600.0, 0.0)
+    more = np.where(power > 0, power / c["efficiency"], power) * step / 3600.0
+    state[:, ENERGY] += np.where(active, np.maximum(more, -wheels), 0.0)
+
+
 @njit(cache=True)
 def drive_rovers(
     state: np.ndarray,

@@ -12,17 +12,21 @@ from quarterdeck.geo.scenario import Site
 from quarterdeck.mission.director import Command, Director, Event, State
 from quarterdeck.mission.mission import Mission, Waypoint
 from quarterdeck.physics.faults import Fault, active, next_change
-from quarterdeck.physics.fleet import Squad, form_squads
+from quarterdeck.physics.fleet import Rovers, Squad, form_squads
+from quarterdeck.physics.rover import climb_parameters
 from quarterdeck.physics.sensing import Legs, Senses, Sensing
 from quarterdeck.physics.separation import give_way
+from quarterdeck.physics.terrain import Terrain, stand, steepness
 from quarterdeck.physics.trace import TraceBuilder
 from quarterdeck.physics.wind import MEMORY, step_gusts
-from quarterdeck.physics.world import INCONSISTENT, World
+from quarterdeck.physics.world import GAP, HEIGHT, INCONSISTENT, World
 
 DECIDE = 1.0  # s between calls of the director
 HARBOUR = 4.0  # lengths: so near its start or end a vehicle is being launched or recovered
 KEEP = 3.0  # lengths kept from other vehicles
 CRASH = 4.0  # m/s: a multirotor that meets the ground faster is out of the mission
+ASIDE = 50.0  # m about the ground routes in which PyBullet has the terrain
+UP = np.array([0.0, 0.0, 1.0])
 STUCK = 60.0  # s in contact without a pause: the vehicle is given up
 
 
@@ -40,6 +44,7 @@ class Running:
     faults: tuple[Fault, ...]
     sensing: Sensing
     known: Site
+    terrain: Terrain | None = None
     time: float = 0.0
     memory: Any = None
     served: dict[str, float] = field(default_factory=dict)
@@ -79,8 +84,13 @@ class Running:
             pose = np.column_stack([self.position[:, :2], self.heading])
             self.senses = Senses(self.sensing, self.known, vehicles, pose, np.random.default_rng([self.seed, 0x5E]))
         blocking = [o for o in self.mission.site.obstacles if o.blocks & {v.domain for v in vehicles}]
-        self.world.add_obstacles(blocking)
-        self.world.add_vehicles(vehicles, self.position, self.heading)
+        self.ground, self.pitch, self.roll, self.lift = (np.zeros(self.count) for _ in range(4))
+        self.trouble: list[str] = []  # with the terrain
+        if self.terrain is not None:
+            self._lay(self.terrain)
+        self.world.add_obstacles(blocking, self.terrain)
+        up = np.column_stack([np.zeros((self.count, 2)), self.lift])
+        self.world.add_vehicles(vehicles, self.position + up, self.heading)
 
     @property
     def finished(self) -> np.ndarray:
@@ -99,15 +109,17 @@ class Running:
         position, heading = self._poses()
         velocity = (position - self.position) / step
         rate = ((heading - self.heading + np.pi) % (2 * np.pi) - np.pi) / step
-        touched = self.world.advance(velocity, rate)
+        rise = self._rise(self.terrain, position, heading) / step if self.terrain is not None else np.zeros(self.count)
+        touched = self.world.advance(velocity + rise[:, None] * UP, rate)
         self.contact[:] = False
         for i in touched:
             body, psi, v, r = self.world.state(i)
             self.contact[i] = True
+            body, v = body - self.lift[i] * UP, v - rise[i] * UP
             if np.abs(body - position[i]).max() > INCONSISTENT or abs(np.sin(psi - heading[i])) > INCONSISTENT:
                 if self.mission.vehicles[i].domain != "aerial":
                     body[2] = 0.0
-                self.world.place(i, body, psi)
+                self.world.place(i, body + self.lift[i] * UP, psi)
                 squad, place = self._squad(i)
                 squad.adopt(place, body, psi, v, r, self.current)
                 position[i], heading[i], velocity[i] = body, psi, (body - self.position[i]) / step
@@ -163,7 +175,61 @@ class Running:
             turning=tracks["turning"],
             underway=self.underway,
             contact=self.contact,
+            ground=self.ground,
+            pitch=self.pitch,
         )
+
+    def _lay(self, terrain: Terrain) -> None:
+        """Lay the ground and stand the vehicles on it."""
+        self.rolling = np.array([v.domain == "ground" for v in self.mission.vehicles])
+        self.size = np.array([(v.model.length, v.model.width) for v in self.mission.vehicles])
+        self.steepest = np.full(self.count, np.inf)
+        for squad in self.squads:
+            if isinstance(squad, Rovers):
+                squad.climb = np.array([climb_parameters(v.model) for v in squad.vehicles])
+                self.steepest[squad.index] = squad.climb["gradeability"]
+        if self.rolling.any():
+            ways = [r.xyz[:, :2] for r in self.mission.routes if self.mission.vehicle(r.vehicle).domain == "ground"]
+            places = np.concatenate([self.position[self.rolling, :2], *ways])
+            (west, south), (east, north) = (places.min(axis=0) - ASIDE).tolist(), (places.max(axis=0) + ASIDE).tolist()
+            part = terrain.crop((west, south, east, north))
+            if part is not None:
+                self.world.add_terrain(part)
+        self._rise(terrain, self.position, self.heading)
+
+    def _rise(self, terrain: Terrain, position: np.ndarray, heading: np.ndarray) -> np.ndarray:
+        """Take over the ground at where the vehicles come to, tilt the bodies to it, and return how far it rises, (k,).
+
+        One on ground that is steeper than it climbs, or not known, is given up. Vessels have the water at 0; aerial
+        vehicles fly above the ground, as their plan has it.
+        """
+        height, pitch, roll = stand(terrain, position[:, :2], heading, *self.size.T)
+        steep = steepness(pitch, roll)
+        gone = self.rolling & ~self.aground & ((steep > self.steepest) | np.isnan(steep))
+        for i in np.flatnonzero(gone):
+            why = (
+                "the terrain is not known"
+                if np.isnan(steep[i])
+                else (
+                    f"the ground is {np.degrees(steep[i]):.1f} degrees steep, it climbs {np.degrees(self.steepest[i]):.0f}"
+                )
+            )
+            x, y, _ = position[i]
+            self.trouble.append(f"{self.ids[i]}: given up at {self.time:.0f} s, x {x:.1f} m, y {y:.1f} m: {why}")
+        self.aground |= gone
+        over = np.where(self.aerial, terrain.height(position[:, :2]), np.where(self.rolling, height, 0.0))
+        self.ground = np.where(np.isnan(over), self.ground, over)
+        self.pitch, self.roll = (np.where(self.rolling, np.nan_to_num(a), 0.0) for a in (pitch, roll))
+        before, gap = self.lift, (HEIGHT["ground"] / 2 + GAP) / np.cos(np.nan_to_num(steep))
+        self.lift = self.ground + np.where(self.rolling, gap, 0.0)
+        for i in np.flatnonzero(self.rolling) if self.world.bodies else ():
+            at = self.position[i] + before[i] * UP
+            self.world.place(int(i), at, float(self.heading[i]), float(self.pitch[i]), float(self.roll[i]))
+        for squad in self.squads:
+            if isinstance(squad, Rovers):
+                squad.pitch = self.pitch[squad.index]
+                squad.active[:] &= ~self.aground[squad.index]
+        return self.lift - before
 
     def _true_cross(self, believed: np.ndarray) -> np.ndarray:
         """Return (k,) cross-track errors in metres of where the vehicles are, not of where they believe to be."""

@@ -14,6 +14,7 @@ from quarterdeck.physics.faults import read_faults
 from quarterdeck.physics.report import Report, measure
 from quarterdeck.physics.running import DECIDE, Running
 from quarterdeck.physics.sensing import Sensing
+from quarterdeck.physics.terrain import Terrain, check_terrain
 from quarterdeck.physics.trace import Trace, TraceBuilder
 from quarterdeck.physics.world import open_world
 
@@ -38,6 +39,7 @@ def simulate(
     gusts: float = 0.0,
     faults: Sequence[str] = (),
     sensing: Sensing | None = None,
+    terrain: Terrain | None = None,
     limits: Mapping[str, float] | None = None,
     duration: float | None = None,
     progress: Callable[[float, float], None] | None = None,
@@ -47,14 +49,16 @@ def simulate(
     `step` seconds a PyBullet step (at most 0.1; the models integrate in smaller ones), `sample` seconds between
     samples of the trace (default: every step). `current` and `wind` are (east, north) m/s, `gusts` the standard
     deviation of Dryden gusts in m/s. `faults` are texts as `faults.read_faults` takes them; `sensing` says what is sensed
-    instead of known (default: all is known). `limits` change the verdict's (see report.LIMITS). The run ends when every
-    vehicle is done, or after `duration` seconds (default: twice the planned time and ten minutes). `progress` is told
-    seconds done and expected.
+    instead of known (default: all is known). `terrain` is the ground (default: flat). `limits` change the verdict's
+    (see report.LIMITS). The run ends when every vehicle is done, or after `duration` seconds (default: twice the planned
+    time and ten minutes). `progress` is told seconds done and expected.
 
     Raises InputError for a vehicle model without its dynamics or a wrong option, UnavailableError where PyBullet is
     absent.
     """
     _check(mission, step, sample, current, wind, gusts)
+    if terrain is not None:
+        check_terrain(terrain, mission)
     planned = max((max(r.duration, r.length / mission.vehicle(r.vehicle).speed) for r in mission.routes), default=0.0)
     until = 2.0 * planned + 600.0 if duration is None else duration
     ids = [v.id for v in mission.vehicles]
@@ -64,7 +68,7 @@ def simulate(
         mission = replace(mission, site=replace(known, obstacles=(*known.obstacles, *sensing.unmapped)))
     with open_world(step) as world:
         air = np.array([*wind, 0.0])
-        run = Running(mission, director, world, seed, np.array(current), air, gusts, befalling, sensing, known)
+        run = Running(mission, director, world, seed, np.array(current), air, gusts, befalling, sensing, known, terrain)
         builder = TraceBuilder(tuple(v.id for v in mission.vehicles))
         every = max(1, round((sample or step) / step))
         run.decide()
@@ -92,6 +96,7 @@ def simulate(
         "lidar": sensing.lidar or sensing.amcl,
         "amcl": sensing.amcl,
         "field": sensing.field,
+        "terrain": None if terrain is None else [*terrain.origin, terrain.cell, *terrain.heights.shape],
         "unmapped": [o.id for o in sensing.unmapped],
     }
     report = measure(
@@ -103,6 +108,7 @@ def simulate(
         limits=limits or {},
         settings=settings,
         lost=run.lost.tolist(),
+        trouble=run.trouble,
         localisation=run.senses.report() if run.senses else None,
     )
     return Run(trace, report)

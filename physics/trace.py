@@ -14,7 +14,8 @@ class Trace:
     Wh used, `leg` the number of the waypoint made for, in the last command (the route's, where nothing was changed),
     `kind` its code in `paths.LEGS`, `cross` metres to port of the leg (aerial: off it, in any direction), `turning`
     near a corner or holding, `underway` clear of the places where it is launched and recovered, `contact` touching an
-    obstacle or another vehicle.
+    obstacle or another vehicle. `z` is above the ground, whose height `ground` is metres in the terrain's datum (0
+    without one, and where it is not known); `pitch` radians, nose up, is that of a ground vehicle on its slope.
     """
 
     vehicles: tuple[str, ...]
@@ -31,6 +32,8 @@ class Trace:
     turning: np.ndarray
     underway: np.ndarray
     contact: np.ndarray
+    ground: np.ndarray
+    pitch: np.ndarray
 
     @property
     def hash(self) -> str:
@@ -54,6 +57,8 @@ COLUMNS = {
     "turning": np.bool_,
     "underway": np.bool_,
     "contact": np.bool_,
+    "ground": np.float64,
+    "pitch": np.float32,
 }
 
 

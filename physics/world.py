@@ -15,12 +15,15 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from quarterdeck.geo.errors import UnavailableError
+from quarterdeck.geo.errors import InputError, UnavailableError
 from quarterdeck.geo.scenario import Obstacle, Vehicle
+from quarterdeck.physics.terrain import Terrain
 
 HEIGHT = {"surface": 1.0, "ground": 0.6, "aerial": 0.2}  # m, of a vehicle's body
 BIT = {"surface": 2, "ground": 4, "aerial": 8}  # collision groups; obstacles are 1
 CHUNK = 40_000  # triangles a mesh: createCollisionShape refuses more than 131 072 vertices
+NODES = 2_000_000  # of a heightfield: PyBullet hands over 8 MiB of floats, and spoils what is beyond
+GAP = 0.13  # m between the ground and a ground vehicle's body, where there is terrain
 INCONSISTENT = 1e-6  # m: a body that is this far from its model has been pushed
 
 
@@ -33,10 +36,42 @@ class World:
         self.obstacles: set[int] = set()
         self.domains: list[str] = []
 
-    def add_obstacles(self, obstacles: Sequence[Obstacle]) -> None:
-        """Add solid prisms; those that block the same domains share meshes."""
+    def add_terrain(self, terrain: Terrain) -> None:
+        """Add the ground as a heightfield; ground vehicles' bodies collide with it.
+
+        Raises InputError if it has more nodes than PyBullet takes.
+        """
+        if terrain.heights.size > NODES:
+            raise InputError(
+                f"terrain: {terrain.heights.size} nodes about the ground routes, PyBullet takes {NODES}; give larger cells"
+            )
+        rows, columns = terrain.heights.shape
+        known = np.isfinite(terrain.heights)
+        if not known.any():
+            return
+        low, high = float(terrain.heights[known].min()), float(terrain.heights[known].max())
+        shape = self.bullet.createCollisionShape(
+            self.bullet.GEOM_HEIGHTFIELD,
+            meshScale=[terrain.cell, terrain.cell, 1.0],
+            heightfieldData=np.where(known, terrain.heights, low).ravel().tolist(),
+            numHeightfieldRows=columns,  # PyBullet's rows run along y: it counts along x first
+            numHeightfieldColumns=rows,
+            physicsClientId=self.client,
+        )
+        (x, y), half = terrain.origin, terrain.cell / 2  # a heightfield is centred on its position, in height too
+        at = [x + half * (columns - 1), y + half * (rows - 1), (low + high) / 2]
+        body = self.bullet.createMultiBody(0, shape, -1, at, physicsClientId=self.client)
+        self.bullet.setCollisionFilterGroupMask(body, -1, 1, 1 | BIT["ground"], physicsClientId=self.client)
+
+    def add_obstacles(self, obstacles: Sequence[Obstacle], terrain: Terrain | None = None) -> None:
+        """Add solid prisms, on the terrain if there is one; those that block the same domains share meshes."""
+
+        def solid(obstacle: Obstacle) -> np.ndarray:
+            low, high = terrain.range(obstacle.polygon.bounds) if terrain is not None else (0.0, 0.0)
+            return prism(obstacle.polygon, min(low, 0.0) - 1.0, max(high, 0.0) + obstacle.height)
+
         for blocks in sorted({o.blocks for o in obstacles if o.blocks}, key=sorted):
-            soup = np.concatenate([prism(o.polygon, -1.0, o.height) for o in obstacles if o.blocks == blocks])
+            soup = np.concatenate([solid(o) for o in obstacles if o.blocks == blocks])
             mask = sum(BIT[domain] for domain in blocks)
             for first in range(0, len(soup), CHUNK):
                 part = soup[first : first + CHUNK].reshape(-1, 3)
@@ -113,11 +148,10 @@ class World:
             rates[2],
         )
 
-    def place(self, index: int, position: np.ndarray, heading: float) -> None:
-        """Put a body upright at a place."""
-        self.bullet.resetBasePositionAndOrientation(
-            self.bodies[index], position.tolist(), [0, 0, np.sin(heading / 2), np.cos(heading / 2)], self.client
-        )
+    def place(self, index: int, position: np.ndarray, heading: float, pitch: float = 0.0, roll: float = 0.0) -> None:
+        """Put a body at a place: upright, or with its nose up by `pitch` and its port side by `roll`, radians."""
+        turned = self.bullet.getQuaternionFromEuler([roll, -pitch, heading])
+        self.bullet.resetBasePositionAndOrientation(self.bodies[index], position.tolist(), turned, self.client)
 
 
 @contextlib.contextmanager

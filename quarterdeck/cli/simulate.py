@@ -79,6 +79,9 @@ class Limit(click.ParamType):
     help="The potential field of robots with lidar: scaled by the goal's distance, or the inspection paper's.",
 )
 @click.option("--unmapped", metavar="SITE", help="GeoJSON with obstacles that are there, but that the plan does not know.")
+@click.option(
+    "--terrain", metavar="FILE", help="Ground that is not flat: an ESRI ASCII grid, or NPZ. See docs/simulation.md."
+)
 @seed_option
 @click.option(
     "--limit", "limits", type=Limit(), multiple=True, help="A limit of the verdict; repeatable. See docs/simulation.md."
@@ -102,6 +105,7 @@ def command(
     amcl: bool,
     field: Literal["scaled", "paper"],
     unmapped: str | None,
+    terrain: str | None,
     seed: int,
     limits: tuple[tuple[str, float], ...],
     step: float,
@@ -118,12 +122,14 @@ def command(
     from quarterdeck.mission.planfile import read_plan
     from quarterdeck.physics.sensing import Sensing
     from quarterdeck.physics.simulate import simulate
+    from quarterdeck.physics.terrain import read_terrain
 
     for name in (report, rrd, picture):  # told before the run, not after it
         if name and name != "-" and Path(name).exists() and not force:
             raise InputError(f"{name} exists; give --force to overwrite it, or another name")
     mission = read_plan(plan)
     strange = read_obstacles(unmapped, mission.frame) if unmapped else ()
+    ground = read_terrain(terrain) if terrain else None
     sensing = Sensing(gnss=gnss, lidar=lidar, amcl=amcl, unmapped=strange, field=field)
     with _progress(mission.name) as progress:
         run = simulate(
@@ -135,6 +141,7 @@ def command(
             gusts=gusts,
             faults=faults,
             sensing=sensing,
+            terrain=ground,
             limits=dict(limits),
             progress=progress,
         )
