@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 OUT ?= out
 
-.PHONY: demo test lint bench bench-coverage bench-physics bench-assign soak docs clean
+.PHONY: demo test lint bench bench-coverage bench-physics bench-assign bench-triage soak docs clean
 
 $(VENV)/installed: pyproject.toml
 	python3 -m venv $(VENV)
@@ -26,7 +26,7 @@ lint: $(VENV)/installed  ## style, types and layers
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: bench-coverage bench-physics bench-assign  ## ratios, not tests: minutes
+bench: bench-coverage bench-physics bench-assign bench-triage  ## ratios, not tests: minutes
 
 bench-coverage: $(VENV)/installed
 	$(BIN)/python benchmarks/coverage_table.py
@@ -37,6 +37,9 @@ bench-physics: $(VENV)/installed  ## PVS=, GPD=: checkouts of PythonVehicleSimul
 bench-assign: $(VENV)/installed
 	$(BIN)/python -m pip install --quiet pyvrp ortools
 	$(BIN)/python benchmarks/assignment.py --table
+
+bench-triage: $(VENV)/installed
+	$(BIN)/python benchmarks/triage.py
 
 docs: $(VENV)/installed  ## what is generated in docs/: the format of sites
 	$(BIN)/python docs/generate.py

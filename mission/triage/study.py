@@ -9,9 +9,10 @@ from math import ceil
 import numpy as np
 from scipy.stats import binomtest
 
+from quarterdeck.geo.scenario import Scenario
 from quarterdeck.mission.triage.figures import figures
 from quarterdeck.mission.triage.generate import FEWEST, FIELD, MOST, generate, paper_team
-from quarterdeck.mission.triage.outcome import run_triage
+from quarterdeck.mission.triage.outcome import Outcome, run_triage
 from quarterdeck.mission.triage.settings import Settings
 
 _CHUNK = 25  # cases handed to a process at a time
@@ -35,10 +36,17 @@ class Variant:
 
 def run_case(variant: Variant, seed: int) -> dict[str, float]:
     """Return the figures of one seeded case; `complete` is 1 if all was searched, found and treated, else 0."""
-    team = paper_team(ugvs=variant.ugvs, uavs=variant.uavs, medics=variant.medics, size=variant.size, speeds=variant.speeds)
-    scenario = generate(team, seed, casualties=variant.casualties, clustered=variant.clustered)
-    outcome = run_triage(scenario, variant.method, variant.settings, seed=seed)
+    outcome = case_outcome(variant, seed)
     return figures(outcome) | {"seed": float(seed), "complete": float(not outcome.reasons)}
+
+
+def case_outcome(variant: Variant, seed: int, site: Scenario | None = None) -> Outcome:
+    """Return what became of one seeded case: on a site with its own team, or on the variant's field with its team."""
+    team = site or paper_team(
+        ugvs=variant.ugvs, uavs=variant.uavs, medics=variant.medics, size=variant.size, speeds=variant.speeds
+    )
+    scenario = generate(team, seed, casualties=variant.casualties, clustered=variant.clustered)
+    return run_triage(scenario, variant.method, variant.settings, seed=seed)
 
 
 def run_study(

@@ -7,63 +7,27 @@ from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from functools import lru_cache
 from multiprocessing import get_context
 from typing import Any
 
-from quarterdeck.campaign.study import Case, flat
+from quarterdeck.campaign.kind import Case
 from quarterdeck.geo.errors import InputError, UnavailableError
 from quarterdeck.geo.version import VERSION
-from quarterdeck.mission.mission import Mission
 
 TRIES = 3  # times that a case may take its worker down before it is given up
-_ONE = threading.Lock()  # PyBullet is not made for threads; a Dask worker may have several
 
 
 def run_case(text: str, case: Case, limits: dict[str, float]) -> dict[str, Any]:
-    """Return the row of one run: the case, the verdict with its reasons, the report's figures, the trajectory's hash.
+    """Return the row of one run: the case, the verdict with its reasons, and the figures.
 
     What goes wrong inside becomes the row's `error`: one bad run does not end a campaign.
     """
-    from quarterdeck.physics.sensing import Sensing
-    from quarterdeck.physics.simulate import simulate
-
-    row = flat(case)
+    row = case.row()
     try:
-        with _ONE:
-            report = simulate(
-                _mission(text),
-                seed=case.seed,
-                current=case.current,
-                wind=case.wind,
-                gusts=case.gusts,
-                faults=case.faults,
-                sensing=Sensing(gnss=case.gnss, lidar=case.lidar, amcl=case.amcl),
-                limits=limits,
-            ).report
+        found = case.run(text, limits)
     except Exception as error:
         return row | {"passed": False, "error": f"{type(error).__name__}: {error}", "reasons": ""}
-    return row | {
-        "passed": report.passed,
-        "error": "",
-        "reasons": "; ".join(report.reasons),
-        **report.figures,
-        "trace_hash": report.trace_hash,
-    }
-
-
-@lru_cache(maxsize=2)
-def _mission(text: str) -> Mission:
-    """Return the mission in a plan's text, read once a process."""
-    import tempfile
-    from pathlib import Path
-
-    from quarterdeck.mission.planfile import read_plan
-
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "plan.geojson"
-        path.write_text(text, encoding="utf-8")
-        return read_plan(path)
+    return row | {"passed": found.pop("passed"), "error": "", "reasons": found.pop("reasons")} | found
 
 
 def over_processes(text: str, todo: list[Case], limits: dict[str, float], jobs: int) -> Iterator[dict[str, Any]]:
@@ -155,7 +119,7 @@ def _version() -> str:
 
 
 def _given_up(case: Case) -> dict[str, Any]:
-    return flat(case) | {"passed": False, "error": f"took its worker down {TRIES} times", "reasons": ""}
+    return case.row() | {"passed": False, "error": f"took its worker down {TRIES} times", "reasons": ""}
 
 
 def _mind_the_parent(parent: int) -> None:

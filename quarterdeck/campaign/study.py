@@ -1,11 +1,10 @@
-"""A study: one plan under many conditions, read from TOML, and the runs that it asks for."""
+"""A study: a plan, or triage, under many conditions, read from TOML, and the runs that it asks for."""
 
 import hashlib
 import math
-import shlex
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import product
 from pathlib import Path
@@ -13,22 +12,15 @@ from typing import Any
 
 import numpy as np
 
+from quarterdeck.campaign.kind import Case, Kind, is_number
+from quarterdeck.campaign.plans import PLAN
+from quarterdeck.campaign.triage import TEAM, TRIAGE
 from quarterdeck.geo.errors import InputError
-from quarterdeck.geo.reader import read_bytes
-from quarterdeck.mission.mission import Mission
+from quarterdeck.geo.reader import read_bytes, read_scenario
 from quarterdeck.mission.planfile import read_plan
 from quarterdeck.physics.faults import read_faults
-from quarterdeck.physics.positioning import GNSS
 from quarterdeck.physics.report import check_limits
 
-NUMBERS = {
-    "current_speed": "m/s of the water",
-    "current_towards": "compass degrees that it goes to",
-    "wind_speed": "m/s, mean",
-    "wind_from": "compass degrees that it comes from",
-    "gusts": "m/s, standard deviation",
-}
-FLAGS = ("lidar", "amcl")
 MOST_RUNS = 1_000_000
 
 
@@ -37,12 +29,14 @@ class Study:
     """What to run. `fixed` conditions, `levels` those of which every value is run, `drawn` those drawn anew for each run.
 
     `runs` of each combination; run r of every combination has the seed `seed` + r and the same draws, so that combinations
-    are compared under the same luck. `text` is the plan's, `hash` stands for all that the results depend on.
+    are compared under the same luck. `source` is the path of the plan or site, if any, and `text` what is in it; `hash`
+    stands for all that the results depend on.
     """
 
     path: Path
-    plan: Path
-    mission: Mission
+    kind: Kind
+    name: str
+    source: Path | None
     text: str
     runs: int
     seed: int
@@ -56,22 +50,6 @@ class Study:
     def count(self) -> int:
         """How many runs there are in all."""
         return self.runs * math.prod(len(values) for values in self.levels.values())
-
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """One run. `levels` are the values of the conditions that the study varies; the rest is what `simulate` takes."""
-
-    number: int
-    seed: int
-    current: tuple[float, float]
-    wind: tuple[float, float]
-    gusts: float
-    faults: tuple[str, ...]
-    gnss: str | None
-    lidar: bool
-    amcl: bool
-    levels: Mapping[str, Any] = field(default_factory=dict)
 
 
 def read_study(path: Path) -> Study:
@@ -93,38 +71,68 @@ def read_study(path: Path) -> Study:
 
 
 def _study(path: Path, document: dict[str, Any]) -> Study:
-    _known(document, ("plan", "runs", "seed", "conditions", "limits"), "")
-    if not isinstance(document.get("plan"), str):
-        raise InputError("'plan' must be the path of a PLAN file")
+    read = _about_triage if "triage" in document else _about_plan
+    kind, name, source, conditions, limits = read(path.parent, document)
     runs, seed = _whole(document, "runs", 1, 100), _whole(document, "seed", 0, 0)
+    fixed, levels, drawn = {}, {}, {}
+    for key, value in conditions.items():
+        if isinstance(value, dict):
+            drawn[key] = _distribution(kind, key, value)
+        elif isinstance(value, list) and (key not in kind.lists or any(isinstance(v, list) for v in value)):
+            if not value:
+                raise InputError(f"{kind.table}.{key} is an empty list")
+            levels[key] = tuple(kind.value(key, v) for v in value)
+        else:
+            fixed[key] = kind.value(key, value)
+    text = "" if source is None else read_bytes(source).decode("utf-8-sig")
+    told = repr((kind.table, runs, seed, fixed, levels, drawn, sorted(limits.items()))) + text
+    digest = hashlib.sha256(told.encode()).hexdigest()
+    study = Study(path, kind, name, source, text, runs, seed, fixed, levels, drawn, limits, digest)
+    if study.count > MOST_RUNS:
+        raise InputError(f"asks for {study.count:,} runs, more than {MOST_RUNS:,}; vary less or lower 'runs'")
+    return study
+
+
+_About = tuple[Kind, str, Path | None, dict[str, Any], dict[str, float]]
+
+
+def _about_plan(folder: Path, document: dict[str, Any]) -> _About:
+    """Return a plan's kind, name and path, the conditions as they stand, and the limits."""
+    _known(document, ("plan", "runs", "seed", "conditions", "limits", "triage"), "")
+    if not isinstance(document.get("plan"), str):
+        raise InputError("'plan' must be the path of a PLAN file, or [triage] the table of a triage study")
     conditions, limits = document.get("conditions", {}), document.get("limits", {})
     if not isinstance(conditions, dict) or not isinstance(limits, dict):
         raise InputError("[conditions] and [limits] must be tables")
-    _known(conditions, (*NUMBERS, "faults", "gnss", *FLAGS), "conditions.")
+    _known(conditions, PLAN.names, "conditions.")
     if any(isinstance(v, bool) or not isinstance(v, int | float) for v in limits.values()):
         raise InputError("[limits] must be numbers")
     check_limits(limits)
-    fixed, levels, drawn = {}, {}, {}
-    for name, value in conditions.items():
-        if isinstance(value, dict):
-            drawn[name] = _distribution(name, value)
-        elif isinstance(value, list) and (name != "faults" or any(isinstance(v, list) for v in value)):
-            if not value:
-                raise InputError(f"conditions.{name} is an empty list")
-            levels[name] = tuple(_value(name, v) for v in value)
-        else:
-            fixed[name] = _value(name, value)
-    plan = path.parent / document["plan"]
-    mission = read_plan(plan)
-    text = read_bytes(plan).decode("utf-8-sig")
-    told = repr((runs, seed, fixed, levels, drawn, sorted(limits.items()))) + text
-    digest = hashlib.sha256(told.encode()).hexdigest()
-    study = Study(path, plan, mission, text, runs, seed, fixed, levels, drawn, limits, digest)
-    if study.count > MOST_RUNS:
-        raise InputError(f"asks for {study.count:,} runs, more than {MOST_RUNS:,}; vary less or lower 'runs'")
-    for faults in (*levels.get("faults", ()), fixed.get("faults", ())):
-        read_faults(faults, [v.id for v in mission.vehicles], 1.0, 0)
-    return study
+    mission = read_plan(folder / document["plan"])
+    schedules = conditions.get("faults", [])
+    for faults in schedules if isinstance(schedules, list) else ():
+        told = PLAN.value("faults", faults if isinstance(faults, list) else schedules)
+        read_faults(told, [v.id for v in mission.vehicles], 1.0, 0)
+    return PLAN, mission.name, folder / document["plan"], conditions, limits
+
+
+def _about_triage(folder: Path, document: dict[str, Any]) -> _About:
+    """Return the same of a triage study, which has no limits."""
+    _known(document, ("triage", "runs", "seed"), "")
+    if not isinstance(document["triage"], dict):
+        raise InputError("[triage] must be a table")
+    conditions = dict(document["triage"])
+    site = conditions.pop("site", None)
+    if site is None:
+        _known(conditions, TRIAGE.names, "triage.")
+        return TRIAGE, "triage", None, conditions, {}
+    if not isinstance(site, str):
+        raise InputError("triage.site must be the path of a site in GeoJSON")
+    for name in TEAM:
+        if name in conditions:
+            raise InputError(f"triage.{name} cannot be given with a site, which has a field and a team of its own")
+    _known(conditions, TRIAGE.names, "triage.")
+    return TRIAGE, read_scenario(folder / site).name, folder / site, conditions | dict.fromkeys(TEAM), {}
 
 
 def cases(study: Study) -> Iterator[Case]:
@@ -135,51 +143,15 @@ def cases(study: Study) -> Iterator[Case]:
         levels = dict(zip(study.levels, values, strict=True))
         for r in range(study.runs):
             c = {**study.fixed, **levels, **draws[r]}
-            yield Case(
-                number=number,
-                seed=study.seed + r,
-                current=_vector(c.get("current_speed", 0.0), c.get("current_towards", 0.0)),
-                wind=_vector(c.get("wind_speed", 0.0), c.get("wind_from", 0.0) + 180.0),
-                gusts=c.get("gusts", 0.0),
-                faults=c.get("faults", ()),
-                gnss=c.get("gnss"),
-                lidar=c.get("lidar", False),
-                amcl=c.get("amcl", False),
-                levels=levels,
-            )
+            yield study.kind.case(number, study.seed + r, c, levels)
             number += 1
-
-
-def replay(study: Study, case: Case) -> str:
-    """Return the command that runs a case again, exactly."""
-    words = ["quarterdeck simulate", shlex.quote(str(study.plan)), f"--seed {case.seed}"]
-    motions = {"current": case.current, "wind": case.wind}
-    words += [f"--{name}={east!r},{north!r}" for name, (east, north) in motions.items() if east or north]
-    if case.gusts:
-        words.append(f"--gusts {case.gusts!r}")
-    words += [f"--fail {shlex.quote(text)}" for text in case.faults]
-    words += [f"--gnss {case.gnss}"] * (case.gnss is not None)
-    words += ["--lidar"] * case.lidar + ["--amcl"] * case.amcl
-    words += [f"--limit {name}={float(value)!r}" for name, value in study.limits.items()]
-    return " ".join(words)
-
-
-def flat(case: Case) -> dict[str, Any]:
-    """Return a case as columns of a table."""
-    row = asdict(case)
-    del row["levels"]
-    for name in ("current", "wind"):
-        row[f"{name}_east"], row[f"{name}_north"] = row.pop(name)
-    row["faults"] = " ".join(case.faults)
-    row["gnss"] = case.gnss or ""
-    return row
 
 
 def _draw(study: Study, r: int) -> dict[str, float]:
     """Return the drawn conditions of run `r` of each combination."""
     out = {}
     for name, what in study.drawn.items():
-        random = np.random.default_rng([study.seed, r, list(NUMBERS).index(name)])
+        random = np.random.default_rng([study.seed, r, list(study.kind.numbers).index(name)])
         a, b = next(iter(what.values()))
         value = random.uniform(a, b) if "uniform" in what else random.normal(a, b)
         # What is no direction is not negative; rounded so that the command that replays the run is readable.
@@ -187,49 +159,19 @@ def _draw(study: Study, r: int) -> dict[str, float]:
     return out
 
 
-def _vector(speed: float, towards: float) -> tuple[float, float]:
-    """Return east and north of a speed and a compass direction in degrees."""
-    angle = math.radians(towards)
-    return round(speed * math.sin(angle), 9) + 0.0, round(speed * math.cos(angle), 9) + 0.0
-
-
-def _distribution(name: str, value: dict[str, Any]) -> dict[str, tuple[float, float]]:
+def _distribution(kind: Kind, name: str, value: dict[str, Any]) -> dict[str, tuple[float, float]]:
     pair = next(iter(value.values()), None)
-    numbers = isinstance(pair, list) and len(pair) == 2 and all(_is_number(v) for v in pair)
-    if name not in NUMBERS or len(value) != 1 or next(iter(value)) not in ("uniform", "normal") or not numbers:
+    numbers = isinstance(pair, list) and len(pair) == 2 and all(is_number(v) for v in pair)
+    if name not in kind.numbers or len(value) != 1 or next(iter(value)) not in ("uniform", "normal") or not numbers:
         raise InputError(
-            f"conditions.{name} must be a value, a list, or a number drawn by {{ uniform = [low, high] }} "
+            f"{kind.table}.{name} must be a value, a list, or a number drawn by {{ uniform = [low, high] }} "
             "or {{ normal = [mean, deviation] }}".replace("{{", "{").replace("}}", "}")
         )
     assert isinstance(pair, list)
-    kind, (a, b) = next(iter(value)), pair
-    if (kind == "uniform" and a > b) or (kind == "normal" and b < 0):
-        raise InputError(f"conditions.{name}: {kind} = {pair} is the wrong way round")
-    return {kind: (float(a), float(b))}
-
-
-def _value(name: str, value: Any) -> Any:
-    if name in NUMBERS:
-        if not _is_number(value) or (value < 0 and not name.endswith(("towards", "from"))):
-            raise InputError(f"conditions.{name} = {value!r} must be a number, {NUMBERS[name]}")
-        return float(value)
-    if name in FLAGS:
-        if not isinstance(value, bool):
-            raise InputError(f"conditions.{name} = {value!r} must be true or false")
-        return value
-    if name == "gnss":
-        if value not in ("", *GNSS):
-            raise InputError(f"conditions.gnss = {value!r} must be one of {', '.join(GNSS)}, or empty for perfect fixes")
-        return value or None
-    if not isinstance(value, list) or not all(isinstance(v, str) for v in value):
-        raise InputError(
-            f"conditions.faults: {value!r} must be a list of texts, such as ['usv-2@600'], or a list of such lists"
-        )
-    return tuple(value)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    form, (a, b) = next(iter(value)), pair
+    if (form == "uniform" and a > b) or (form == "normal" and b < 0):
+        raise InputError(f"{kind.table}.{name}: {form} = {pair} is the wrong way round")
+    return {form: (float(a), float(b))}
 
 
 def _whole(document: dict[str, Any], name: str, least: int, default: int) -> int:

@@ -1,4 +1,4 @@
-"""What a campaign proves: the probability of success with its confidence, why runs failed, the worst of them."""
+"""What a campaign proves: the probability of success and the figures with their confidence, why runs failed, the worst."""
 
 import csv
 import io
@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from quarterdeck.campaign.study import Case, Study, replay
-
-FIGURES = ("coverage_driven", "time", "energy", "legs_p95", "clearance", "separation", "localisation_p95")
+from quarterdeck.campaign.kind import Case
+from quarterdeck.campaign.study import Study
 
 
 def wilson(successes: int, runs: int, confidence: float = 0.95) -> tuple[float, float]:
@@ -29,6 +28,23 @@ def wilson(successes: int, runs: int, confidence: float = 0.95) -> tuple[float, 
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
+def mean_interval(values: Sequence[float]) -> tuple[float, float | None, float | None] | None:
+    """Return the mean and its 95 % interval (Student's t), which one value does not have; None without any.
+
+    In closed form, since a campaign may have a million runs.
+    """
+    from scipy.special import stdtrit
+
+    if not len(values):
+        return None
+    sample = np.array(values, dtype=float)
+    mean, n = float(sample.mean()), len(sample)
+    if n < 2:
+        return mean, None, None
+    half = float(stdtrit(n - 1, 0.975) * sample.std(ddof=1) / math.sqrt(n))
+    return mean, mean - half, mean + half
+
+
 def summarise(study: Study, cases: Sequence[Case], rows: Mapping[int, Mapping[str, Any]], worst: int = 5) -> dict[str, Any]:
     """Return the campaign's figures: for all runs and for each combination of levels, and the `worst` runs with their
     replay.
@@ -37,26 +53,33 @@ def summarise(study: Study, cases: Sequence[Case], rows: Mapping[int, Mapping[st
     for case in cases:
         if case.number in rows:
             groups.setdefault(json.dumps(case.levels), []).append(rows[case.number])
+    first: Sequence[Mapping[str, Any]] = next(iter(groups.values()), [])
+    names = study.kind.figures
     done = [row for case in cases if (row := rows.get(case.number)) is not None]
     by_number = {case.number: case for case in cases}
     return {
         "study": str(study.path),
-        "plan": str(study.plan),
-        "mission": study.mission.name,
+        "source": None if study.source is None else str(study.source),
+        "mission": study.name,
         "asked": study.count,
         **_success(done),
-        "levels": [{"levels": json.loads(name), **_success(group)} for name, group in groups.items()]
+        "levels": [
+            {"levels": json.loads(name), **_success(group), "means": _means(group, names)}
+            | ({"differences": _differences(group, first, names)} if group is not first else {})
+            for name, group in groups.items()
+        ]
         if study.levels
         else [],
         "reasons": dict(Counter(kind for row in done for kind in sorted(_kinds(row))).most_common()),
-        "figures": {name: spread for name in FIGURES if (spread := _spread(done, name))},
+        "means": _means(done, names),
+        "figures": {name: spread for name in names if (spread := _spread(done, name))},
         "worst": [
             {
                 "number": row["number"],
                 "passed": row["passed"],
                 "reasons": row["error"] or row["reasons"],
                 "trace_hash": row.get("trace_hash", ""),
-                "replay": replay(study, by_number[row["number"]]),
+                "replay": by_number[row["number"]].replay(str(study.source or ""), study.limits),
             }
             for row in sorted(done, key=badness)[:worst]
         ],
@@ -124,6 +147,25 @@ def _success(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "low": low,
         "high": high,
     }
+
+
+def _means(rows: Sequence[Mapping[str, Any]], names: Sequence[str]) -> dict[str, Any]:
+    """Return the mean of each figure with its interval, over the runs that have it."""
+    found = {name: mean_interval([row[name] for row in rows if row.get(name) is not None]) for name in names}
+    return {name: interval for name, interval in found.items() if interval}
+
+
+def _differences(
+    rows: Sequence[Mapping[str, Any]], first: Sequence[Mapping[str, Any]], names: Sequence[str]
+) -> dict[str, Any]:
+    """Return by how much each figure is above that of the first combination, run by run of the same seed."""
+    other = {row["seed"]: row for row in first}
+    pairs = [(row, other[row["seed"]]) for row in rows if row["seed"] in other]
+    found = {
+        name: mean_interval([a[name] - b[name] for a, b in pairs if a.get(name) is not None and b.get(name) is not None])
+        for name in names
+    }
+    return {name: interval for name, interval in found.items() if interval}
 
 
 def _kinds(row: Mapping[str, Any]) -> set[str]:

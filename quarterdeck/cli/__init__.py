@@ -13,7 +13,7 @@ from quarterdeck.geo.errors import QuarterdeckError
 VERBS = {
     "chart": "ENC cells as a site.",
     "assign": "Visit tasks with priority, time and precedence.",
-    "campaign": "Many runs of one plan, on this machine or a cluster.",
+    "campaign": "Many runs of one plan, or of triage, on this machine or a cluster.",
     "check": "Every problem of a site or a plan.",
     "export": "Autopilot and ECDIS files, recording, pictures.",
     "init": "A small site to start from.",

@@ -1,4 +1,4 @@
-"""`quarterdeck campaign`: many runs of one plan, and what they prove."""
+"""`quarterdeck campaign`: many runs of one plan, or of triage, and what they prove."""
 
 from __future__ import annotations
 
@@ -14,10 +14,15 @@ from quarterdeck.cli.output import console, force_option
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from quarterdeck.campaign.study import Case, Study
+    from rich.table import Table
+
+    from quarterdeck.campaign.kind import Case
+    from quarterdeck.campaign.study import Study
+
+MOST_MEANS = 12  # combinations whose means are printed; those of more are in summary.json
 
 
-@click.command(short_help="Many runs of one plan, on this machine or a cluster.")
+@click.command(short_help="Many runs of one plan, or of triage, on this machine or a cluster.")
 @click.argument("study", type=click.Path(path_type=Path))
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path), help="Folder for the results (default: STUDY.runs beside it)."
@@ -90,7 +95,7 @@ def _shown(study: Study, every: list[Case], todo: list[Case], rows: Iterator[dic
         screen.print(f"{len(every) - len(todo):,} of {len(every):,} runs are done already")
     layout = [TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[failed]}")]
     with Progress(*layout, TimeRemainingColumn(), console=screen, transient=True, disable=not screen.is_terminal) as bar:
-        task = bar.add_task(study.mission.name, total=len(every), completed=len(every) - len(todo), failed="")
+        task = bar.add_task(study.name, total=len(every), completed=len(every) - len(todo), failed="")
         failed = 0
         for row in rows:
             failed += not row["passed"]
@@ -119,6 +124,8 @@ def _print(summary: dict[str, Any], folder: Path, parquet: bool) -> None:
             f"{level['low']:.1%}", f"{level['high']:.1%}",
         )  # fmt: skip
     screen.print(table)
+    if len(summary["levels"]) <= MOST_MEANS:
+        screen.print(_means(summary["levels"] or [{"levels": {}, "means": summary["means"]}], names))
     for reason, count in summary["reasons"].items():
         screen.print(f"{count:>6,} runs: {reason}", soft_wrap=True)
     for run in summary["worst"]:
@@ -131,5 +138,26 @@ def _print(summary: dict[str, Any], folder: Path, parquet: bool) -> None:
         screen.print("runs.parquet needs pyarrow: pip install 'quarterdeck[campaign]'")
 
 
+def _means(levels: list[dict[str, Any]], names: list[str]) -> Table:
+    """Return the table of means, a row for each figure and combination."""
+    from rich.table import Table
+
+    def cells(interval: list[float | None] | None) -> list[str]:
+        return [""] * 3 if interval is None else ["" if v is None else f"{v:,.4g}" for v in interval]
+
+    table = Table(title="means; differences from the first, run by run of the same seed", title_justify="left")
+    for name in ("figure", *names):
+        table.add_column(name)
+    for name in ("mean", "95 % from", "to", "difference", "95 % from", "to"):
+        table.add_column(name, justify="right")
+    for figure in dict.fromkeys(n for level in levels for n in level["means"]):
+        for i, level in enumerate(levels):
+            told = [_word(level["levels"][n]) for n in names]
+            mean, difference = level["means"].get(figure), level.get("differences", {}).get(figure)
+            last = i == len(levels) - 1
+            table.add_row("" if i else figure, *told, *cells(mean), *cells(difference), end_section=last)
+    return table
+
+
 def _word(value: Any) -> str:
-    return (" ".join(value) or "none") if isinstance(value, list) else "" if value is None else f"{value}"
+    return (" ".join(map(str, value)) or "none") if isinstance(value, list) else "" if value is None else f"{value}"

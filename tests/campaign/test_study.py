@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from quarterdeck.campaign.study import cases, flat, read_study, replay
+from quarterdeck.campaign.study import cases, read_study
 from quarterdeck.geo.errors import InputError
 
 Writer = Callable[[str], Path]
@@ -115,13 +115,13 @@ def test_the_replay_says_all(study: Writer) -> None:
         )
     )
     (case,) = cases(asked)
-    words = shlex.split(replay(asked, case))
+    words = shlex.split(case.replay(str(asked.source), asked.limits))
     assert words[:2] == ["quarterdeck", "simulate"]
     assert f"--wind={case.wind[0]!r},{case.wind[1]!r}" in words
     for pair in (("--seed", "3"), ("--gusts", "0.5"), ("--fail", "ugv-1@5"), ("--gnss", "sbas"), ("--limit", "delay=3.0")):
         assert words[words.index(pair[0]) + 1] == pair[1]
     assert "--amcl" in words
-    assert flat(case)["wind_east"] == case.wind[0]
+    assert case.row()["wind_east"] == case.wind[0]
 
 
 def test_the_documented_study_is_one(study: Writer) -> None:
