@@ -1,6 +1,7 @@
 """Reading GeoJSON text and the geometry of its features, every problem told with its place."""
 
 import json
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,6 +13,7 @@ from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.importers import as_geojson
 from quarterdeck.geo.scenario import as_multipolygon
 
+_SURROGATE = re.compile(r"[\ud800-\udfff]")
 WGS84_NAMES = ("urn:ogc:def:crs:OGC:1.3:CRS84", "urn:ogc:def:crs:OGC::CRS84", "urn:ogc:def:crs:EPSG::4326", "EPSG:4326")
 
 
@@ -25,10 +27,16 @@ def parse(data: bytes) -> dict[str, Any]:
         document = json.loads(data.decode("utf-8-sig"), parse_constant=_refuse_constant)
     except UnicodeDecodeError:
         raise InputError("not UTF-8 text; save it as GeoJSON in UTF-8") from None
+    except InputError:
+        raise
     except json.JSONDecodeError as error:
         raise InputError(f"not JSON: {error.msg} at line {error.lineno}, column {error.colno}") from None
+    except ValueError as error:  # a whole number of thousands of digits
+        raise InputError(f"not JSON that can be read: {str(error)[:80]}") from None
     except RecursionError:
         raise InputError("not GeoJSON: nested too deeply") from None
+    if b"\\ud" in data.lower() and _SURROGATE.search(json.dumps(document, ensure_ascii=False)):
+        raise InputError("a text has half of a surrogate pair (\\ud800 to \\udfff), which no file can hold; take it out")
     if isinstance(document, dict) and document.get("type") == "Feature":
         document = {"type": "FeatureCollection", "features": [document]}
     if not isinstance(document, dict) or document.get("type") != "FeatureCollection":

@@ -289,7 +289,10 @@ def _vehicle(feature: dict[str, Any], frame: Frame, problems: list[str]) -> Vehi
 
 def _task(feature: dict[str, Any], frame: Frame) -> Task:
     given = {k: v for k, v in feature["properties"].items() if v is not None}
-    after = tuple(Precedence(a) if isinstance(a, str) else Precedence(**a) for a in given.get("after", ()))
+    after = tuple(
+        Precedence(a) if isinstance(a, str) else Precedence(a["task"], a.get("mode", "finish_to_start"))
+        for a in given.get("after", ())
+    )
     low, high = given.get("window", (0.0, float("inf")))
     return Task(
         id=feature["id"],
@@ -323,7 +326,8 @@ def _site(
     if operating:
         return Site(tuple(areas), as_multipolygon(unary_union(operating)), tuple(obstacles))
     vehicles = [a for a in actors if isinstance(a, Vehicle)]
-    reach = [*points, *(v.home for v in vehicles)]
+    reach = [*points, *(t.position for t in actors if isinstance(t, Task))]
+    reach += [xy for v in vehicles for xy in (v.start, v.home)]
     hull = unary_union([*(a.polygon for a in areas), MultiPoint(reach)]).convex_hull
     margin = max((v.clearance for v in vehicles), default=0.0) + max((2 * v.turn_radius for v in vehicles), default=0.0)
     return Site(tuple(areas), as_multipolygon(hull.buffer(max(margin, 1.0), quad_segs=8)), tuple(obstacles))

@@ -103,6 +103,11 @@ def _way(vehicle: Vehicle, lines: Lines, road: Roadmap) -> tuple[np.ndarray, lis
     legs: list[Leg] = ["start"]
     tracks = lines.driven
     if not tracks:
+        home = shortest_paths(road, np.array(vehicle.start), np.array(vehicle.home))[1][0][0]
+        if home is None:
+            return np.array(points), legs, [f"{vehicle.id}: no way from its start to its end; move them"]
+        for point in home[1:].tolist():
+            _add(points, legs, point, "transit")
         return np.array(points), legs, []
     way_out = shortest_paths(road, np.array(vehicle.start), tracks[0][0])[1][0][0]
     way_home = shortest_paths(road, tracks[-1][-1], np.array(vehicle.home))[1][0][0]

@@ -173,7 +173,8 @@ def read_plan(source: str | Path) -> Mission:
         try:
             return _mission(str(document.get("name", "")), headers[0], features)
         except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
-            raise InputError(f"is a damaged PLAN ({type(error).__name__}: {error}); plan it again") from None
+            what = f"{error} is missing" if isinstance(error, KeyError) else " ".join(str(error).split())[:120]
+            raise InputError(f"is a damaged PLAN ({what}); plan it again") from None
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
 
@@ -196,6 +197,10 @@ def _mission(name: str, header: dict[str, Any], features: list[dict[str, Any]]) 
             for f in of("obstacle")
         ),
     )
+    vehicles = tuple(_vehicle(f, frame) for f in of("vehicle"))
+    routes = {f["properties"]["vehicle"]: _route(f, frame) for f in of("route")}
+    if sorted(routes) != sorted(v.id for v in vehicles):
+        raise ValueError("its vehicles and its routes do not match: one route a vehicle")
     layers: dict[str, list[tuple[Any, dict[str, Any]]]] = {}
     for f in of("layer"):
         properties = {k: v for k, v in f["properties"].items() if k not in ("role", "layer")}
@@ -204,8 +209,8 @@ def _mission(name: str, header: dict[str, Any], features: list[dict[str, Any]]) 
         name=name,
         frame=frame,
         site=site,
-        vehicles=tuple(_vehicle(f, frame) for f in of("vehicle")),
-        routes=tuple(_route(f, frame) for f in of("route")),
+        vehicles=vehicles,
+        routes=tuple(routes[v.id] for v in vehicles),
         method=header["method"],
         parameters=header["parameters"],
         seed=header["seed"],
@@ -232,7 +237,7 @@ def _metres(lonlat: list[float], frame: Frame) -> tuple[float, float]:
 
 def _vehicle(feature: dict[str, Any], frame: Frame) -> Vehicle:
     given = feature["properties"]
-    figures = {n: given[n] for n in VEHICLE_FIGURES}
+    figures: dict[str, Any] = {n: None if given[n] is None else float(given[n]) for n in VEHICLE_FIGURES}
     for unlimited in ("endurance", "battery"):
         figures[unlimited] = math.inf if figures[unlimited] is None else figures[unlimited]
     return Vehicle(
@@ -263,7 +268,7 @@ def _route(feature: dict[str, Any], frame: Frame) -> Route:
     if any(len(c) != len(line) for c in columns):
         raise ValueError(f"route of {given['vehicle']}: lists of different lengths")
     waypoints = tuple(
-        Waypoint(float(x), float(y), float(h), leg, speed, hold, time, task)
+        Waypoint(float(x), float(y), float(h), leg, float(speed), float(hold), float(time), task)
         for (x, y), h, leg, speed, hold, time, task in zip(xy, z, *columns, strict=True)
     )
-    return Route(given["vehicle"], waypoints, given["energy"])
+    return Route(given["vehicle"], waypoints, float(given["energy"]))

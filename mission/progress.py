@@ -36,6 +36,8 @@ def planned_progress(mission: Mission, time: float, *, stopped: Mapping[str, flo
     for name, end in (stopped or {}).items():
         if name not in ends:
             raise InputError(f"unknown vehicle {name!r}; the plan has {', '.join(ends)}")
+        if not end >= 0:
+            raise InputError(f"vehicle {name!r}: lost since {end:g} s; seconds since the mission's start are not negative")
         ends[name] = min(time, end)
     positions, energy = {}, {}
     tracks: list[np.ndarray] = []
@@ -45,7 +47,7 @@ def planned_progress(mission: Mission, time: float, *, stopped: Mapping[str, flo
         at = _place(route, ends[route.vehicle])
         positions[vehicle.id] = at[1]
         energy[vehicle.id] = route.energy * min(1.0, ends[vehicle.id] / route.duration) if route.duration else 0.0
-        tracks += _surveyed(route, *at)
+        tracks += surveyed(route, *at)
         served |= {w.task for w in route.waypoints if w.task and w.time + w.hold <= ends[vehicle.id]}
     return Progress(time, positions, energy, tuple(tracks), frozenset(served))
 
@@ -64,7 +66,7 @@ def _place(route: Route, time: float) -> tuple[int, tuple[float, float, float]]:
     return reached, (float(x), float(y), float(z))
 
 
-def _surveyed(route: Route, reached: int, position: tuple[float, float, float]) -> list[np.ndarray]:
+def surveyed(route: Route, reached: int, position: tuple[float, float, float]) -> list[np.ndarray]:
     """Return the (n, 2) lines along which a route has surveyed when it stands at `position` after `reached` waypoints."""
     points = np.vstack([route.xyz[:reached, :2], position[:2]])
     survey = np.append(

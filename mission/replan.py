@@ -69,7 +69,7 @@ def replan(mission: Mission, progress: Progress, changes: Changes = Changes(), *
         input_hash=mission.input_hash,
     )
     roads = roadmaps(scenario)
-    own, released = _left(mission, scenario, progress, changes, mission.seed if seed is None else seed)
+    own, released, told = _left(mission, scenario, progress, changes, mission.seed if seed is None else seed)
     lines = share_out(vehicles, own, released, crumb=mission.spacing)
     routes, reasons = line_routes(vehicles, lines, roads)
     routes = tuple(_airborne(r, v, progress) for v, r in zip(vehicles, routes, strict=True))
@@ -81,9 +81,15 @@ def replan(mission: Mission, progress: Progress, changes: Changes = Changes(), *
         parameters=dict(mission.parameters) | {"replanned_at": progress.time, "lost": sorted(changes.lost)},
         figures=_figures(scenario.site, mission.spacing, progress, vehicles, routes),
         bounds={},
-        reasons=tuple(reasons),
+        seed=mission.seed if seed is None else seed,
+        reasons=(*_lasting(mission), *told, *reasons),
         layers=(),
     )
+
+
+def _lasting(mission: Mission) -> list[str]:
+    """Return the reasons of a plan that its energy and time did not give: what was out of reach is so still."""
+    return [r for r in mission.reasons if "short by" not in r]
 
 
 def _guards(mission: Mission, progress: Progress, changes: Changes, seed: int) -> Mission:
@@ -134,7 +140,15 @@ def _rest(mission: Mission, progress: Progress) -> Mission:
     vehicles = tuple(_moved(v, progress) for v in mission.vehicles)
     reasons = [reason for v, r in zip(vehicles, routes, strict=True) for reason in shortfalls(v, r)]
     told = dict(mission.parameters) | {"replanned_at": progress.time, "lost": []}
-    return replace(mission, routes=routes, vehicles=vehicles, parameters=told, reasons=tuple(reasons))
+    left = {"makespan": max(r.duration for r in routes), "energy": sum(r.energy for r in routes)}
+    return replace(
+        mission,
+        routes=routes,
+        vehicles=vehicles,
+        parameters=told,
+        figures=dict(mission.figures) | left,
+        reasons=(*_lasting(mission), *reasons),
+    )
 
 
 def _route_left(route: Route, progress: Progress, vehicle: Vehicle) -> Route:
@@ -154,7 +168,14 @@ def _airborne(route: Route, vehicle: Vehicle, progress: Progress) -> Route:
         return route
     points = route.xyz
     points[0, 2] = altitude
-    return timed_route(vehicle, points, [w.leg for w in route.waypoints], holds=[w.hold for w in route.waypoints])
+    return timed_route(
+        vehicle,
+        points,
+        [w.leg for w in route.waypoints],
+        holds=[w.hold for w in route.waypoints],
+        tasks=[w.task for w in route.waypoints],
+        pace=[1.0 if w.z != route.xyz[i - 1, 2] else w.speed / vehicle.speed for i, w in enumerate(route.waypoints)],
+    )
 
 
 def _survivors(mission: Mission, progress: Progress, changes: Changes) -> tuple[Vehicle, ...]:
@@ -187,8 +208,10 @@ def _changed_site(site: Site, changes: Changes) -> Site:
 
 def _left(
     mission: Mission, scenario: Scenario, progress: Progress, changes: Changes, seed: int
-) -> tuple[list[list[np.ndarray]], list[np.ndarray]]:
-    """Return the (n, 2) survey lines still to be driven: each survivor's own in order, and those that nobody has."""
+) -> tuple[list[list[np.ndarray]], list[np.ndarray], list[str]]:
+    """Return the (n, 2) survey lines still to be driven: each survivor's own in order, those that nobody has, and what
+    cannot be reached of new areas.
+    """
     spacing = float(mission.spacing or 0.0)
     done = shapely.union_all(
         [shapely.buffer(shapely.LineString(t), VISITED * spacing) for t in progress.tracks if len(t) > 1]
@@ -199,13 +222,16 @@ def _left(
     runs = {r.vehicle: unbroken(r.xyz[:, :2], r.survey) for r in mission.routes}
     by_vehicle = {v: [line for run in own for line in remaining_parts(run, done, reach)] for v, own in runs.items()}
     released = [line for vehicle in sorted(changes.lost) for line in by_vehicle[vehicle]]
+    told: list[str] = []
     if changes.areas:
         fresh = replace(scenario, site=replace(scenario.site, areas=changes.areas))
         fresh = replace(fresh, vehicles=tuple(replace(v, share=None) for v in scenario.vehicles))
         angle, edge = mission.parameters.get("angle"), mission.parameters.get("edge", "cells")
         added = cover(fresh, spacing=spacing, seed=seed, angle=angle, edge=edge)
         released += [run for r in added.routes for run in unbroken(r.xyz[:, :2], r.survey)]
-    return [by_vehicle.get(v.id, []) for v in scenario.vehicles], released
+        told = _lasting(added)
+    own = [[] if v.id in changes.lost else by_vehicle.get(v.id, []) for v in scenario.vehicles]
+    return own, released, told
 
 
 def _figures(

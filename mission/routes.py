@@ -72,8 +72,8 @@ def way_routes(
         if vehicle.domain == "aerial" and len(xyz) > 1:
             survey = np.array([leg == "survey" for leg in kinds])
             xyz[:, 2] = np.where(survey, vehicle.altitude, vehicle.altitude + (i + 1) * LAYER_STEP)
-            xyz, kinds = _with_takeoff(xyz, kinds)
-            pace, holds = np.ones(len(xyz)), np.zeros(len(xyz))
+            xyz, kinds, kept = _with_takeoff(xyz, kinds)
+            pace, holds = np.where(kept < 0, 1.0, pace[kept]), np.where(kept < 0, 0.0, holds[kept])
         holds[0] = _launch_delay(vehicles, i)
         route = timed_route(vehicle, xyz, kinds, holds=holds.tolist(), pace=pace)
         routes.append(route)
@@ -114,20 +114,22 @@ def _launch_delay(vehicles: Sequence[Vehicle], index: int) -> float:
     return float(sum(2 * room / v.speed for v in ahead))
 
 
-def _with_takeoff(xyz: np.ndarray, legs: list[Leg]) -> tuple[np.ndarray, list[Leg]]:
-    """Put a climb at the start and a descent at the end of an aerial path; changes of altitude are made on the spot."""
-    rows: list[np.ndarray] = [np.array([*xyz[0, :2], 0.0])]
-    kinds: list[Leg] = ["start"]
-    for i, (row, leg) in enumerate(zip(xyz, legs, strict=True)):
-        if i == 0:
-            rows.append(np.array([*row[:2], xyz[min(1, len(xyz) - 1), 2]]))
-            kinds.append("takeoff")
-            continue
+def _with_takeoff(xyz: np.ndarray, legs: list[Leg]) -> tuple[np.ndarray, list[Leg], np.ndarray]:
+    """Put a climb at the start and a descent at the end of an aerial path; changes of altitude are made on the spot.
+
+    Returns the (m, 3) points, the kind of each leg, and (m,) which point of `xyz` each was, -1 where it is new.
+    """
+    rows: list[np.ndarray] = [np.array([*xyz[0, :2], 0.0]), np.array([*xyz[0, :2], xyz[min(1, len(xyz) - 1), 2]])]
+    kinds: list[Leg] = ["start", "takeoff"]
+    kept = [-1, -1]
+    for i, (row, leg) in enumerate(zip(xyz[1:], legs[1:], strict=True), start=1):
         if row[2] != rows[-1][2]:
             rows.append(np.array([*rows[-1][:2], row[2]]))
             kinds.append("transit")
+            kept.append(-1)
         rows.append(row)
         kinds.append(leg)
+        kept.append(i)
     rows.append(np.array([*xyz[-1, :2], 0.0]))
     kinds.append("landing")
-    return np.array(rows), kinds
+    return np.array(rows), kinds, np.array([*kept, -1])

@@ -37,14 +37,14 @@ def remaining_parts(line: np.ndarray, done: BaseGeometry, reach: BaseGeometry | 
 
 
 def share_out(
-    vehicles: Sequence[Vehicle], own: Sequence[Sequence[np.ndarray]], released: Sequence[np.ndarray], *, crumb: float | None
+    vehicles: Sequence[Vehicle], own: Sequence[Sequence[np.ndarray]], released: Sequence[np.ndarray], *, crumb: float
 ) -> list[list[np.ndarray]]:
     """Return each vehicle's (n, 2) lines in metres: its own in order, less what it gives away, then what it takes over.
 
     The least level of finishing times is sought, by bisection, at which what those above it give away, and the released
     lines, fit into the time of those below it. No piece is cut shorter than `crumb` metres.
     """
-    least = float(crumb or 0.0)
+    least = float(crumb)
     if not any(len(o) for o in own) and not released:
         return [[] for _ in vehicles]
     slowest = min(v.speed for v in vehicles)
@@ -57,10 +57,12 @@ def share_out(
         level = (low + high) / 2 if best is not None else high
         shared = _shared_at(level, vehicles, own, released, least)
         if shared is None:
-            low = level
+            low, high = level, high if best is not None else 2 * high
         else:
             high, best = level, shared
-    return best if best is not None else [[*lines] for lines in own]
+    if best is None:
+        raise RuntimeError("survey lines could not be shared out")
+    return best
 
 
 def _shared_at(

@@ -5,8 +5,9 @@ Each stage is imported when it is first called, so that importing the package co
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
+from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.reader import read_scenario
 from quarterdeck.geo.scenario import Scenario
 from quarterdeck.mission.mission import Mission
@@ -27,6 +28,8 @@ def plan(scenario: Scenario, *, method: Method | None = None, seed: int = 0, **o
     Raises InputError if the scenario cannot be planned as it is.
     """
     method = method or default_method(scenario)
+    if method not in get_args(Method):
+        raise InputError(f"unknown method {method!r}; use one of {', '.join(get_args(Method))}")
     if method == "guards":
         from quarterdeck.mission.guards import plan_guards
 

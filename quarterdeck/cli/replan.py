@@ -2,7 +2,7 @@
 
 import click
 
-from quarterdeck.cli.output import emit, force_option, output_option, print_figures, seed_option
+from quarterdeck.cli.output import emit, force_option, output_option, print_figures
 
 
 @click.command(short_help="From what has happened so far: losses, additions, withdrawals.")
@@ -13,10 +13,18 @@ from quarterdeck.cli.output import emit, force_option, output_option, print_figu
 @click.option("--add", metavar="SITE", help="GeoJSON of what is new: obstacles, areas, tasks, vehicles that join.")
 @click.option("--gone", default="", help="Ids of obstacles that are no more, with commas.")
 @click.option("--withdrawn", default="", help="Ids of areas and tasks that need not be done any more, with commas.")
-@seed_option
+@click.option("--seed", type=click.IntRange(min=0), help="Seed of all that is random; default the plan's.")
 @force_option
 def command(
-    plan: str, output: str, time: float, lost: str, add: str | None, gone: str, withdrawn: str, seed: int, force: bool
+    plan: str,
+    output: str,
+    time: float,
+    lost: str,
+    add: str | None,
+    gone: str,
+    withdrawn: str,
+    seed: int | None,
+    force: bool,
 ) -> int:
     """Write the mission of PLAN from now on: what is done stays done, survivors go on from where they are and come home."""
     from quarterdeck.geo.errors import InputError

@@ -66,6 +66,9 @@ class Limit(click.ParamType):
     multiple=True,
     help="What goes wrong: usv-2@600 (lost), gnss:usv-1@300-420, thruster:usv-3@100, comms:usv-1@50, random:3; repeatable.",
 )
+@click.option("--recover", is_flag=True, help="Replan in the run when a vehicle is lost or comes back.")
+@click.option("--delay", type=click.FloatRange(min=0), default=30.0, show_default=True,
+              help="Seconds without a word before a vehicle is given up (with --recover).")  # fmt: skip
 @click.option(
     "--gnss", type=click.Choice(["rtk", "sbas", "single"]), help="Receivers with errors, instead of perfect ones."
 )
@@ -100,6 +103,8 @@ def command(
     wind: tuple[float, float],
     gusts: float,
     faults: tuple[str, ...],
+    recover: bool,
+    delay: float,
     gnss: str | None,
     lidar: bool,
     amcl: bool,
@@ -120,6 +125,7 @@ def command(
     from quarterdeck.geo.files import write_file
     from quarterdeck.geo.reader import read_obstacles
     from quarterdeck.mission.planfile import read_plan
+    from quarterdeck.mission.recovery import recovering
     from quarterdeck.physics.sensing import Sensing
     from quarterdeck.physics.simulate import simulate
     from quarterdeck.physics.terrain import read_terrain
@@ -134,6 +140,7 @@ def command(
     with _progress(mission.name) as progress:
         run = simulate(
             mission,
+            director=recovering(mission, delay=delay, tell=_replanned) if recover else None,
             seed=seed,
             step=step,
             current=current,
@@ -229,3 +236,9 @@ def _metres(distance: float | None) -> str:
 
 def _change(driven: float, planned: float) -> str:
     return f"{(driven / planned - 1) * 100:+.1f} %" if planned > 0 else ""
+
+
+def _replanned(time: float, after: Mission) -> None:
+    click.echo(f"{minutes(time)}: replanned for {', '.join(v.id for v in after.vehicles)}", err=True)
+    for reason in after.reasons:
+        click.echo(f"  {reason}", err=True)

@@ -1,0 +1,120 @@
+"""The director that recovers: it follows the plan until a vehicle is lost or comes back, and then replans for all."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from shapely import Point
+
+from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.scenario import Obstacle
+from quarterdeck.mission.director import Command, Director, Event, State
+from quarterdeck.mission.inspection import default_director
+from quarterdeck.mission.mission import Mission
+from quarterdeck.mission.progress import Progress, surveyed
+from quarterdeck.mission.replan import Changes, replan
+
+ROOM = 3.0  # lengths kept from a vehicle that stands still, as vehicles keep from each other
+
+
+@dataclass(frozen=True, slots=True)
+class _Memory:
+    """What is remembered: the plan followed and since when, what was done before it, who is missed and until when to wait.
+
+    `used` is each vehicle's watt-hours at `since`; `tracks` and `served` are all that was done before that plan.
+    """
+
+    mission: Mission
+    director: Director
+    since: float = 0.0
+    inner: Any = None
+    tracks: tuple[np.ndarray, ...] = ()
+    served: frozenset[str] = frozenset()
+    used: Mapping[str, float] | None = None
+    missed: tuple[tuple[float, str], ...] = ()
+
+
+def recovering(mission: Mission, *, delay: float = 0.0, tell: Callable[[float, Mission], None] | None = None) -> Director:
+    """Return the director that replans (`mission.replan.replan`) `delay` seconds after a loss is heard of.
+
+    Who is heard of again within the delay was a false alarm; who comes back later takes a part of what is left. `tell` gets
+    the time and each new plan. A loss that nobody is left to recover from changes nothing.
+    """
+
+    def direct(
+        time: float, states: Mapping[str, State], events: tuple[Event, ...], memory: Any
+    ) -> tuple[dict[str, Command], Any]:
+        now: _Memory = memory or _Memory(mission, default_director(mission))
+        planned = {v.id for v in now.mission.vehicles}
+        heard = {e.vehicle for e in events if e.kind == "returned"}
+        missed = tuple(m for m in now.missed if m[1] not in heard)
+        missed += tuple((time + delay, e.vehicle) for e in events if e.kind == "lost" and e.vehicle in planned)
+        served = now.served | {e.subject for e in events if e.kind == "served"}
+        now = replace(now, missed=missed, served=served)
+        lost = frozenset(v for due, v in missed if due <= time and v not in heard)
+        back = [v for v in mission.vehicles if v.id in heard and v.id not in planned]
+        if lost or back:
+            now = _replanned(now, time, states, lost, [(v.id, mission) for v in back], tell)
+        commands, inner = now.director(time - now.since, states, events, now.inner)
+        return commands, replace(now, inner=inner)
+
+    return direct
+
+
+def _replanned(
+    now: _Memory,
+    time: float,
+    states: Mapping[str, State],
+    lost: frozenset[str],
+    back: list[tuple[str, Mission]],
+    tell: Callable[[float, Mission], None] | None,
+) -> _Memory:
+    """Return the memory with a new plan, or, where nobody is left, the old one."""
+    used = now.used or {}
+    tracks = list(now.tracks)
+    for route in now.mission.routes:
+        state = states[route.vehicle]
+        if now.mission.spacing is not None:
+            tracks += surveyed(route, min(state.reached + 1, len(route.waypoints)), (state.x, state.y, state.z))
+    progress = Progress(
+        time=time - now.since,
+        positions={v: (s.x, s.y, s.z) for v, s in states.items()},
+        energy={v: s.energy_used - used.get(v, 0.0) for v, s in states.items()},
+        tracks=tuple(tracks),
+        served=now.served,
+    )
+    joined = tuple(
+        replace(first.vehicle(v), start=(states[v].x, states[v].y), end=first.vehicle(v).home) for v, first in back
+    )
+    kept = replace(now, missed=tuple(m for m in now.missed if m[1] not in lost))
+    try:
+        wrecks = tuple(w for v in sorted(lost) if (w := _wreck(now.mission, v, states)) is not None)
+        after = replan(now.mission, progress, Changes(lost=lost, joined=joined, obstacles=wrecks))
+    except InputError:  # nobody is left
+        return kept
+    if tell:
+        tell(time, after)
+    return replace(
+        kept,
+        mission=after,
+        director=default_director(after),
+        since=time,
+        inner=None,
+        tracks=tuple(tracks),
+        used={v: s.energy_used for v, s in states.items()},
+    )
+
+
+def _wreck(mission: Mission, lost: str, states: Mapping[str, State]) -> Obstacle | None:
+    """Return the lost vehicle as an obstacle where it was last, if it stands in nobody's start, way home or air."""
+    vehicle, state = mission.vehicle(lost), states[lost]
+    if vehicle.domain == "aerial":
+        return None
+    wreck = Point(state.x, state.y).buffer(ROOM * vehicle.model.length)
+    for other in mission.vehicles:
+        here = states[other.id]
+        near = min(wreck.distance(Point(here.x, here.y)), wreck.distance(Point(other.home)))
+        if other.id != lost and near <= other.clearance:
+            return None
+    return Obstacle(f"wreck of {lost}", wreck, frozenset({vehicle.domain}))
