@@ -96,6 +96,8 @@ def place(
     """
     if not (np.isfinite(spacing) and spacing > 0):
         raise InputError(f"spacing {spacing:g} must be a positive number of metres")
+    if angle is not None and not np.isfinite(angle):
+        raise InputError(f"angle {angle:g} must be a finite number")
     area = shapely.normalize(area)  # the same whatever vertex its rings begin at
     edges = area_edges(area, spacing)
     if not len(edges):

@@ -10,13 +10,22 @@ from pathlib import Path
 from quarterdeck.geo.errors import InputError
 
 
+def refuse_existing(path: Path, *, force: bool) -> None:
+    """Raise InputError if a file is at `path` and not `force`, or can be no path here (a name that is too long)."""
+    try:
+        exists = path.exists() and not path.is_dir()  # a folder cannot be overwritten: writing refuses it
+    except OSError as error:
+        raise InputError(f"{path} cannot be written ({error.strerror or error}); choose another place with -o") from None
+    if exists and not force:
+        raise InputError(f"{path} exists; give --force to overwrite it, or another name")
+
+
 def write_file(path: Path, content: bytes | str, *, force: bool = False) -> Path:
     """Write `content` to `path` whole or not at all, and return the path; text is UTF-8 with LF.
 
     Folders are made as needed. Raises InputError if the file exists and not `force`, or it cannot be written.
     """
-    if path.exists() and not force:
-        raise InputError(f"{path} exists; give --force to overwrite it, or another name")
+    refuse_existing(path, force=force)
     data = content.encode("utf-8") if isinstance(content, str) else content
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -39,8 +48,8 @@ def write_file(path: Path, content: bytes | str, *, force: bool = False) -> Path
 def safe_names(names: Iterable[str]) -> dict[str, str]:
     """Return a file name's stem for each name: letters and digits of any script, `-`, `_` and `.`, no two alike.
 
-    Names that only differ in what cannot stand in a file name, or in case, are numbered. A name stays within 100 bytes and
-    is none that Windows reserves.
+    Names that only differ in what cannot stand in a file name, or in case, are numbered. A name stays within 100 bytes, its
+    number apart, and is none that Windows reserves.
     """
     taken: set[str] = set()
     stems: dict[str, str] = {}

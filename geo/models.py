@@ -104,6 +104,8 @@ def _model(document: dict[str, Any]) -> VehicleModel:
     figures |= {key: _number(energy, "energy", key) for key in _ENERGY}
     if figures["speed"] > figures["max_speed"]:
         raise InputError(f"[limits] speed {figures['speed']} exceeds max_speed {figures['max_speed']}")
+    if document["domain"] == "aerial" and not figures.get("climb_rate"):
+        raise InputError("[limits] climb_rate of an aerial vehicle must be a number above 0, m/s")
     return VehicleModel(
         name=document["name"],
         domain=document["domain"],

@@ -110,10 +110,13 @@ def _too_near(mission: Mission) -> list[str]:
             if vehicle.domain not in obstacle.blocks:
                 continue
             shapely.prepare(obstacle.polygon)
-            near = np.flatnonzero(shapely.dwithin(obstacle.polygon, legs, vehicle.clearance - TOLERANCE))
+            near = np.flatnonzero(
+                shapely.dwithin(obstacle.polygon, legs, vehicle.clearance - TOLERANCE)
+                & ~shapely.intersects(obstacle.polygon.buffer(-TOLERANCE), legs)  # those are told as trespasses
+            )
             gaps = [(legs[i].difference(berths).distance(obstacle.polygon), i) for i in near]
             least, leg = min((g for g in gaps if not math.isnan(g[0])), default=(math.inf, 0))
-            if 0 < least < vehicle.clearance - TOLERANCE:
+            if least < vehicle.clearance - TOLERANCE:
                 problems.append(
                     f"{route.vehicle}: leg {leg + 1} passes {obstacle.id!r} at {least:.2f} m; "
                     f"its clearance is {vehicle.clearance:g} m"
@@ -181,7 +184,11 @@ def _closest(
     away_a: Callable[[np.ndarray], np.ndarray],
     away_b: Callable[[np.ndarray], np.ndarray],
 ) -> tuple[float, float]:
-    """The least distance and its time: between two common breakpoints the relative motion is straight, so it is exact."""
+    """The least distance and its time, away from berths.
+
+    Between two common breakpoints the relative motion is straight, so each pair of legs is closest at one place, exactly;
+    where that place is at a berth, the rest of the pair is not looked at.
+    """
     times = np.unique(np.concatenate([a[0], b[0]]))
     times = times[(times >= max(a[0][0], b[0][0])) & (times <= min(a[0][-1], b[0][-1]))]
     if len(times) < 2:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from quarterdeck.cli.output import console, emit, force_option, minutes, output_option, seed_option
+from quarterdeck.cli.output import console, emit, force_option, minutes, output_option, print_reason, seed_option
 from quarterdeck.cli.parameters import Numbers
 
 if TYPE_CHECKING:
@@ -148,4 +148,4 @@ def _print(mission: Mission) -> None:
     for name, metres in figures["served_from_metres_off"].items():
         screen.print(f"task {name!r} is served from {metres:.2f} m off: clearance keeps the vehicle away", soft_wrap=True)
     for reason in mission.reasons:
-        screen.print(f"[bold]infeasible:[/] {reason}", soft_wrap=True)
+        print_reason(screen, "infeasible", reason)

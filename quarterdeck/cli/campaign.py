@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from quarterdeck.cli.output import console, force_option
+from quarterdeck.cli.output import console, force_option, print_reason
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -93,7 +93,12 @@ def _shown(study: Study, every: list[Case], todo: list[Case], rows: Iterator[dic
     screen = console()
     if len(todo) < len(every):
         screen.print(f"{len(every) - len(todo):,} of {len(every):,} runs are done already")
-    layout = [TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[failed]}")]
+    layout = [
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[failed]}"),
+    ]
     with Progress(*layout, TimeRemainingColumn(), console=screen, transient=True, disable=not screen.is_terminal) as bar:
         task = bar.add_task(study.name, total=len(every), completed=len(every) - len(todo), failed="")
         failed = 0
@@ -130,7 +135,7 @@ def _print(summary: dict[str, Any], folder: Path, parquet: bool) -> None:
         screen.print(f"{count:>6,} runs: {reason}", soft_wrap=True)
     for run in summary["worst"]:
         if not run["passed"]:
-            screen.print(f"[bold]run {run['number']}:[/] {run['reasons']}", soft_wrap=True)
+            print_reason(screen, f"run {run['number']}", run["reasons"])
             screen.print(f"    {run['replay']}", soft_wrap=True)
     files = "runs.csv, runs.parquet, summary.json" if parquet else "runs.csv, summary.json"
     screen.print(f"{folder}: {files}", soft_wrap=True)

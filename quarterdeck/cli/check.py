@@ -1,5 +1,8 @@
 """`quarterdeck check`: every problem of a site or a plan."""
 
+import io
+import sys
+
 import click
 
 
@@ -18,15 +21,16 @@ def command(file: str) -> int:
 
     data = read_bytes(file)
     features = parse(data)["features"]
-    if any(isinstance(f, dict) and (f.get("properties") or {}).get("role") == "plan" for f in features):
+    properties = [f.get("properties") for f in features if isinstance(f, dict)]
+    if any(isinstance(p, dict) and p.get("role") == "plan" for p in properties):
         from quarterdeck.mission.check import check_mission
         from quarterdeck.mission.planfile import read_plan
 
-        problems, status = list(check_mission(read_plan(file))), 1
+        problems, status = list(check_mission(read_plan(_again(file, data)))), 1
     else:
-        problems, status = find_problems(file), 2
+        problems, status = find_problems(_again(file, data)), 2
         if not problems:
-            vehicles = read_scenario(file).vehicles
+            vehicles = read_scenario(_again(file, data)).vehicles
             try:
                 shares(vehicles) if vehicles else None
             except InputError as error:
@@ -36,3 +40,10 @@ def command(file: str) -> int:
     if not problems:
         click.echo(f"{file}: no problem found", err=True)
     return status if problems else 0
+
+
+def _again(file: str, data: bytes) -> str:
+    """Return `file`, its bytes put back where it is standard input, which gives them only once."""
+    if file == "-":
+        sys.stdin = io.TextIOWrapper(io.BytesIO(data), encoding="utf-8")
+    return file

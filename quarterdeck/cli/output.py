@@ -2,35 +2,58 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
-from quarterdeck.geo.files import write_file
+from quarterdeck.geo.files import refuse_existing, write_file
 from quarterdeck.mission.mission import Mission
 
+
+def not_there(ctx: click.Context, param: click.Parameter, output: Any) -> Any:  # noqa: ARG001
+    """Return an option's file, or refuse one that exists without --force: told before the work, not after it."""
+    if output and output != "-":
+        refuse_existing(Path(output), force=ctx.params["force"])
+    return output
+
+
 output_option = click.option(
-    "-o", "--output", default="-", show_default=True, help="The file to write; - is standard output."
+    "-o",
+    "--output",
+    default="-",
+    show_default=True,
+    callback=not_there,
+    help="The file to write; - is standard output.",
 )
-force_option = click.option("--force", is_flag=True, help="Overwrite existing files.")
+force_option = click.option("--force", is_flag=True, is_eager=True, help="Overwrite existing files.")
 seed_option = click.option(
     "--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Seed of all that is random."
 )
 
 
-def emit(text: str, output: str, *, force: bool) -> None:
-    """Write `text` to the file `output`, or to standard output for `-`."""
-    if output == "-":
-        sys.stdout.write(text)
-        sys.stdout.flush()
+def emit(content: str | bytes, output: str, *, force: bool) -> None:
+    """Write `content` to the file `output`, or to standard output for `-`."""
+    if output != "-":
+        write_file(Path(output), content, force=force)
+        return
+    if isinstance(content, str):
+        sys.stdout.write(content)
     else:
-        write_file(Path(output), text, force=force)
+        sys.stdout.buffer.write(content)
+    sys.stdout.flush()
 
 
 def console() -> Console:
-    """Return the console on standard error."""
-    return Console(stderr=True, highlight=False)
+    """Return the console on standard error; brackets and colons in names and reasons are just that, no markup."""
+    return Console(stderr=True, highlight=False, markup=False, emoji=False)
+
+
+def print_reason(screen: Console, what: str, reason: str) -> None:
+    """Print a line that begins with `what` in bold."""
+    screen.print(Text.assemble((f"{what}:", "bold"), f" {reason}"), soft_wrap=True)
 
 
 def print_figures(mission: Mission) -> None:
@@ -58,7 +81,7 @@ def print_figures(mission: Mission) -> None:
             f"as the paper: {paper['guards']} guards, {paper['makespan']:,.0f} s (at least {paper['bound']:,.0f} s)"
         )
     for reason in mission.reasons:
-        screen.print(f"[bold]infeasible:[/] {reason}", soft_wrap=True)
+        print_reason(screen, "infeasible", reason)
 
 
 WORDS = {

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from quarterdeck.cli.output import console, emit, force_option, minutes, seed_option
+from quarterdeck.cli.output import console, emit, force_option, minutes, not_there, print_reason, seed_option
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -51,9 +50,9 @@ class Limit(click.ParamType):
 
 @click.command(short_help="Execute a plan in PyBullet; report and verdict.")
 @click.argument("plan")
-@click.option("--report", metavar="FILE", help="Write the report as JSON.")
-@click.option("--rrd", metavar="FILE", help="Record the run for rerun.")
-@click.option("--picture", metavar="FILE", help="Draw plan, tracks and misses as a PNG.")
+@click.option("--report", metavar="FILE", callback=not_there, help="Write the report as JSON.")
+@click.option("--rrd", metavar="FILE", callback=not_there, help="Record the run for rerun.")
+@click.option("--picture", metavar="FILE", callback=not_there, help="Draw plan, tracks and misses as a PNG.")
 @click.option("--current", type=Vector(), default="0,0", show_default=True, help="Water's motion, m/s east and north.")
 @click.option("--wind", type=Vector(), default="0,0", show_default=True, help="Mean wind, m/s towards east and north.")
 @click.option(
@@ -121,8 +120,6 @@ def command(
 
     Exit status 1 if the verdict fails.
     """
-    from quarterdeck.geo.errors import InputError
-    from quarterdeck.geo.files import write_file
     from quarterdeck.geo.reader import read_obstacles
     from quarterdeck.mission.planfile import read_plan
     from quarterdeck.mission.recovery import recovering
@@ -130,9 +127,6 @@ def command(
     from quarterdeck.physics.simulate import simulate
     from quarterdeck.physics.terrain import read_terrain
 
-    for name in (report, rrd, picture):  # told before the run, not after it
-        if name and name != "-" and Path(name).exists() and not force:
-            raise InputError(f"{name} exists; give --force to overwrite it, or another name")
     mission = read_plan(plan)
     strange = read_obstacles(unmapped, mission.frame) if unmapped else ()
     ground = read_terrain(terrain) if terrain else None
@@ -157,11 +151,11 @@ def command(
     if rrd:
         from quarterdeck.exporters.recording import recording
 
-        write_file(Path(rrd), recording(mission, run.trace), force=force)
+        emit(recording(mission, run.trace), rrd, force=force)
     if picture:
         from quarterdeck.exporters.picture import picture as draw
 
-        write_file(Path(picture), draw(mission, run.trace, run.report), force=force)
+        emit(draw(mission, run.trace, run.report), picture, force=force)
     if as_json:
         emit(run.report.to_json(), "-", force=force)
     print_report(mission, run.report)
@@ -176,7 +170,12 @@ def _progress(title: str) -> Iterator[Callable[[float, float], None]]:
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     screen = console()
-    columns = [TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[clock]}"), TimeRemainingColumn()]
+    columns = [
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TextColumn("{task.fields[clock]}"),
+        TimeRemainingColumn(),
+    ]
     began = shown = monotonic()
     with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
         task = bar.add_task(title, clock="")
@@ -225,9 +224,9 @@ def print_report(mission: Mission, report: Report) -> None:
         words.append(f"localised to {figures['localisation_p95']:.2f} m (95 %, worst vehicle)")
     screen.print("; ".join(words))
     for reason in report.reasons:
-        screen.print(f"[bold]failed:[/] {reason}", soft_wrap=True)
+        print_reason(screen, "failed", reason)
     if report.passed:
-        screen.print("[bold]passed[/]")
+        screen.print("passed", style="bold")
 
 
 def _metres(distance: float | None) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from quarterdeck.cli.output import console, emit, force_option, output_option, seed_option
+from quarterdeck.cli.output import console, emit, force_option, not_there, output_option, print_reason, seed_option
 
 if TYPE_CHECKING:
     from quarterdeck.geo.scenario import Scenario
@@ -67,12 +67,12 @@ _FROM_ZERO = click.FloatRange(min=0, max=1e9)
 @click.option("--method", type=click.Choice(METHODS), default="relay", show_default=True, help="Who tells the medic, how.")
 @click.option("--compare", is_flag=True, help="Run all four methods and print their figures side by side.")
 @output_option
-@click.option("--casualty-csv", metavar="FILE", help="Write a row a casualty.")
-@click.option("--log-csv", metavar="FILE", help="Write a row an event.")
-@click.option("--cot", metavar="FILE", help="Write Cursor-on-Target events; needs --start.")
+@click.option("--casualty-csv", metavar="FILE", callback=not_there, help="Write a row a casualty.")
+@click.option("--log-csv", metavar="FILE", callback=not_there, help="Write a row an event.")
+@click.option("--cot", metavar="FILE", callback=not_there, help="Write Cursor-on-Target events; needs --start.")
 @click.option("--start", metavar="TIME", help="When the mission began, such as 2026-05-01T09:00:00Z, for --cot.")
-@click.option("--timeline", metavar="FILE", help="Draw the timeline as PNG.")
-@click.option("--map", "field_map", metavar="FILE", help="Draw the field with everybody's way as PNG.")
+@click.option("--timeline", metavar="FILE", callback=not_there, help="Draw the timeline as PNG.")
+@click.option("--map", "field_map", metavar="FILE", callback=not_there, help="Draw the field with everybody's way as PNG.")
 @click.option("--fail", "fails", type=AtTime(), multiple=True, help="A robot, or a medic's device, fails; repeatable.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on standard error instead of a table.")
 @click.option(
@@ -131,7 +131,6 @@ def command(site: str | None, generate: int | None, output: str, force: bool, se
 
 def _run(scenario: Scenario, settings: Settings, seed: int, output: str, force: bool, options: dict[str, Any]) -> int:
     from quarterdeck.exporters.casualties import casualties_csv, casualties_geojson, cursor_on_target, log_csv
-    from quarterdeck.geo.files import write_file
     from quarterdeck.mission.triage.outcome import run_triage
     from quarterdeck.mission.world import Fault
 
@@ -149,7 +148,7 @@ def _run(scenario: Scenario, settings: Settings, seed: int, output: str, force: 
     made = [(path, make()) for path, make in files if path]
     emit(casualties_geojson(outcome), output, force=force)
     for path, content in made:
-        write_file(Path(path), content, force=force)
+        emit(content, path, force=force)
     if options["as_json"]:
         click.echo(json.dumps({m: _plain(o) for m, o in outcomes.items()}), err=True)
     else:
@@ -256,4 +255,4 @@ def _print(outcomes: dict[str, Outcome]) -> None:
     screen.print(table)
     for method, outcome in outcomes.items():
         for reason in outcome.reasons:
-            screen.print(f"[bold]{method}:[/] {reason}", soft_wrap=True)
+            print_reason(screen, method, reason)

@@ -1,5 +1,6 @@
 """Wrong input at the command line: one line, exit status 2, nothing written."""
 
+import io
 import json
 from pathlib import Path
 
@@ -58,6 +59,57 @@ def test_no_overwriting_without_force(tmp_path, capsys):
     line = refused(capsys, "plan", DATA / "dalian_harbour.geojson", "-o", tmp_path / "plan.geojson")
     assert "--force" in line
     assert (tmp_path / "plan.geojson").read_text() == "mine"
+
+
+def test_an_existing_file_is_refused_before_the_work(tmp_path, capsys):
+    """The output is looked at first: even the site that is not there comes second, and --force may stand anywhere."""
+    (tmp_path / "plan.geojson").write_text("mine")
+    assert "--force" in refused(capsys, "plan", "none.geojson", "-o", tmp_path / "plan.geojson")
+    assert "none.geojson" in refused(capsys, "plan", "none.geojson", "-o", tmp_path / "plan.geojson", "--force")
+
+
+def test_a_name_too_long_for_a_file(tmp_path, capsys):
+    """A name of 300 characters is one line."""
+    assert "cannot be written" in refused(capsys, "init", "-o", tmp_path / ("n" * 300))
+
+
+@pytest.mark.parametrize("angle", ["nan", "inf"])
+def test_an_angle_that_is_no_number(tmp_path, capsys, angle):
+    """Such an angle is one line."""
+    site = DATA / "dalian_harbour.geojson"
+    assert "angle" in refused(capsys, "plan", site, "--spacing", "80", "--angle", angle, "-o", tmp_path / "plan.geojson")
+
+
+def test_properties_that_are_a_list(tmp_path, capsys):
+    """`check` names the feature."""
+    path = changed(tmp_path, "dalian_harbour", lambda f: f[0].update(properties=[1]))
+    with pytest.raises(SystemExit) as stop:
+        main(["check", str(path)])
+    assert stop.value.code == 2
+    assert "features[0]: properties" in capsys.readouterr().out
+
+
+def test_markup_in_a_vehicles_name(tmp_path, capsys):
+    """A name that looks like rich's markup is printed as it is."""
+    path = changed(tmp_path, "dalian_harbour", lambda f: f[-1].update(id="[/v] :ship:"))
+    with pytest.raises(SystemExit) as stop:
+        main(["plan", str(path), "--spacing", "80", "-o", str(tmp_path / "plan.geojson")])
+    assert stop.value.code in (0, 1)
+    assert "[/v] :ship:" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("kind", ["site", "plan"])
+def test_check_reads_standard_input(tmp_path, capsys, monkeypatch, kind):
+    """A sound site, and a PLAN, from standard input have no problem."""
+    data = (DATA / "dalian_harbour.geojson").read_bytes()
+    if kind == "plan":
+        with pytest.raises(SystemExit):
+            main(["plan", str(DATA / "dalian_harbour.geojson"), "--spacing", "80", "-o", str(tmp_path / "plan.geojson")])
+        data = (tmp_path / "plan.geojson").read_bytes()
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(data), encoding="utf-8"))
+    with pytest.raises(SystemExit) as stop:
+        main(["check", "-"])
+    assert (stop.value.code or 0) == 0, capsys.readouterr().out
 
 
 @pytest.mark.parametrize("verb", ["simulate", "export", "replan"])

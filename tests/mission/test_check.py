@@ -64,6 +64,15 @@ def test_each_fault_is_found(changes, words):
     assert any(words in line for line in check_mission(with_waypoint(crossing(30.0), **changes)))
 
 
+@pytest.mark.parametrize("depth", [0.0, 0.03, 0.06])
+def test_a_leg_along_an_obstacles_edge_is_found(depth):
+    """On the edge, and a little inside it, a leg is as wrong as one deep inside, and is told once."""
+    mission = crossing(30.0)
+    moved = replace(mission.site.obstacles[0], polygon=box(20, 50 - depth, 30, 70))
+    edge = replace(mission, site=replace(mission.site, obstacles=(moved,)))
+    assert sum("'rock'" in line for line in check_mission(edge)) == 1
+
+
 def test_energy_and_the_planners_own_reasons_are_told():
     """A route beyond the battery, and what the planner said, are problems."""
     mission = crossing(30.0)
