@@ -7,20 +7,13 @@ import numpy as np
 CHORD = math.radians(10.0)  # of an arc, between neighbouring points: 0.4 % of the radius off the true arc
 
 
-def dubins_path(start: tuple[float, float, float], goal: tuple[float, float, float], radius: float) -> np.ndarray:
-    """Return the (m, 2) points of the shortest path from `start` to `goal`, (x, y, heading), turning at `radius` metres.
-
-    The six words of Dubins (1957), lengths after Shkel & Lumelsky (2001).
-    """
-    return dubins_paths(start, goal, radius)[0]
-
-
 def dubins_paths(
     start: tuple[float, float, float], goal: tuple[float, float, float], radius: float, chord: float = CHORD
 ) -> list[np.ndarray]:
-    """Return the paths of all words that exist, shortest first: where the shortest has no room, another may have.
+    """Return the (m, 2) points of paths from `start` to `goal`, (x, y, heading), turning at `radius` metres.
 
-    Neighbouring points of an arc are `chord` radians apart.
+    They are those of all words of Dubins (1957) that exist, lengths after Shkel & Lumelsky (2001), shortest first: where
+    the shortest has no room, another may have. Neighbouring points of an arc are `chord` radians apart.
     """
     dx, dy = goal[0] - start[0], goal[1] - start[1]
     distance, theta = math.hypot(dx, dy) / radius, math.atan2(dy, dx)
@@ -79,6 +72,8 @@ def _sampled(
     x, y, heading = start
     points = [(x, y)]
     for letter, length in zip(word, lengths, strict=True):
+        if length < 1e-9:  # a segment of none would repeat its point
+            continue
         if letter == "S":
             x, y = x + length * radius * math.cos(heading), y + length * radius * math.sin(heading)
             points.append((x, y))
@@ -91,5 +86,5 @@ def _sampled(
             points.append((cx + side * radius * math.sin(h), cy - side * radius * math.cos(h)))
         x, y = points[-1]
         heading += side * length
-    points[-1] = goal[:2]
+    points[max(1, len(points) - 1) :] = [goal[:2]]  # rounding apart, it is there; where there is no way, two points
     return np.array(points)

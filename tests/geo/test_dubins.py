@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from quarterdeck.geo.dubins import dubins_path, dubins_paths
+from quarterdeck.geo.dubins import dubins_paths
 
 pose = st.tuples(st.floats(-20, 20), st.floats(-20, 20), st.floats(-math.pi, math.pi)).map(
     lambda p: tuple(round(v, 6) for v in p)
@@ -38,14 +38,24 @@ def test_every_word_arrives(start, goal, radius):
 
 def test_known_lengths():
     """Straight ahead is a line; a U-turn to the side two radii away is half a circle."""
-    assert math.isclose(length(dubins_path((0, 0, 0), (10, 0, 0), 2.0)), 10.0)
-    assert math.isclose(length(dubins_path((0, 0, 0), (0, 4, math.pi), 2.0)), 2 * math.pi, rel_tol=2e-3)
+    assert math.isclose(length(dubins_paths((0, 0, 0), (10, 0, 0), 2.0)[0]), 10.0)
+    assert math.isclose(length(dubins_paths((0, 0, 0), (0, 4, math.pi), 2.0)[0]), 2 * math.pi, rel_tol=2e-3)
 
 
 @settings(max_examples=100, deadline=None)
 @given(pose, pose, st.floats(0.5, 8))
 def test_reversal_symmetry(start, goal, radius):
     """The way back, turned round, is as long: an independent check of all words at once."""
-    there = length(dubins_path(start, goal, radius))
-    back = length(dubins_path((*goal[:2], goal[2] + math.pi), (*start[:2], start[2] + math.pi), radius))
+    there = length(dubins_paths(start, goal, radius)[0])
+    back = length(dubins_paths((*goal[:2], goal[2] + math.pi), (*start[:2], start[2] + math.pi), radius)[0])
     assert math.isclose(there, back, rel_tol=1e-2, abs_tol=1e-2 * radius)
+
+
+@settings(max_examples=100, deadline=None)
+@given(pose, st.floats(1, 20), st.sampled_from([0.0, math.pi / 2]), st.floats(0.5, 8))
+def test_no_point_is_repeated(start, distance, turn, radius):
+    """Straight on, and after a quarter turn, words have segments of no length: they leave no point twice."""
+    x, y, heading = start
+    goal = (x + distance * math.cos(heading), y + distance * math.sin(heading), heading + turn)
+    for path in dubins_paths(start, goal, radius):
+        assert (np.hypot(*np.diff(path, axis=0).T) > 0).all()

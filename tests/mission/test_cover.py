@@ -55,6 +55,15 @@ def test_sample_sites(site):
     assert mission.figures["poc"] > 0.85
 
 
+def test_areas_too_far_apart_for_one_grid():
+    """Two small areas 100 km apart at 0.5 m would need a lattice of billions of cells: refused with what to do."""
+    areas = tuple(Area(f"a{i}", MultiPolygon([box(x, x, x + 50, x + 50)])) for i, x in enumerate((-35e3, 35e3)))
+    site = Site(areas, MultiPolygon([box(-4e4, -4e4, 4e4, 4e4)]))
+    boat = Vehicle("a", load_model("otter"), (-35e3, -35e3), speed=1.0, battery=1e6, clearance=0.0)
+    with pytest.raises(InputError, match="one by one"):
+        cover(Scenario("far", Frame(10.0, 54.0), site, (boat,)), spacing=0.5, placement="none")
+
+
 def test_published_shares():
     """Figure 7 of the paper: 10, 10, 20, 20, 40 % of the area, each to within one hypervertex."""
     mission = cover(read_scenario(DATA / "west_ant_island.geojson"))

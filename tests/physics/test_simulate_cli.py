@@ -27,6 +27,16 @@ def run(*args):
     return stop.value.code
 
 
+def test_picture_and_recording_on_standard_output(plan, tmp_path, capfdbinary, monkeypatch):
+    """`-` is standard output for bytes too, not a file of that name."""
+    monkeypatch.chdir(tmp_path)
+    assert run(plan, "--picture", "-") == 0
+    assert capfdbinary.readouterr().out.startswith(b"\x89PNG")
+    assert run(plan, "--rrd", "-") == 0
+    assert capfdbinary.readouterr().out.startswith(b"RRF")
+    assert not (tmp_path / "-").exists()
+
+
 def test_report_by_the_schema_and_exit_0(plan, tmp_path, capfd):
     """Standard output carries the JSON and nothing else, not even what PyBullet prints; the file holds the same."""
     path = tmp_path / "report.json"
