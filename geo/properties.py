@@ -81,6 +81,7 @@ PROPERTIES: dict[str, dict[str, Property]] = {
             "a position [lon, lat]",
             "where it ends; default where it starts",
         ),
+        "returns": Property({"type": "boolean"}, "true or false", "false: stays where its last track ends; default true"),
         "sensor": Property(
             {"type": "object", "required": ["kind"], "properties": {"kind": {"enum": ["swath", "camera", "sonar"]}}},
             'an object with "kind": swath, camera or sonar',
@@ -174,6 +175,7 @@ def _fits(value: Any, schema: dict[str, Any]) -> bool:
 
 
 _KINDS: dict[str, Callable[[Any], bool]] = {
+    "boolean": lambda v: isinstance(v, bool),
     "string": lambda v: isinstance(v, str),
     "integer": lambda v: isinstance(v, int) and not isinstance(v, bool),
     "number": lambda v: isinstance(v, int | float) and not isinstance(v, bool) and abs(v) < 1e12,

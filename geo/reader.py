@@ -284,6 +284,7 @@ def _vehicle(feature: dict[str, Any], frame: Frame, problems: list[str]) -> Vehi
         sensor=sensor,
         range=given.get("range"),
         can=frozenset(given.get("can", ())),
+        returns=given.get("returns", True),
     )
 
 

@@ -77,7 +77,8 @@ class Sensor:
 class Vehicle:
     """A vehicle as the scenario gives it, its model's figures filled in.
 
-    `start` and `end` are (x, y) metres; `end` None means back to `start`. `share` is the part of the area it covers, None
+    `start` and `end` are (x, y) metres; `end` None means back to `start`; where it does not return it stays where its
+    last track ends. `share` is the part of the area it covers, None
     where shares are to follow from speeds. `speed` m/s, `turn_radius`, `clearance` and `range` (how far it sees) metres,
     `endurance` seconds, `battery` watt-hours, `altitude` metres above ground (aerial only), `can` its capabilities.
     """
@@ -96,6 +97,7 @@ class Vehicle:
     sensor: Sensor | None = None
     range: float | None = None
     can: frozenset[str] = frozenset()
+    returns: bool = True
 
     @property
     def domain(self) -> Domain:

@@ -48,6 +48,8 @@ def _vehicle(frame: Frame, vehicle: Vehicle) -> dict[str, Any]:
     if vehicle.sensor is not None:
         swath = {} if vehicle.sensor.swath is None else {"swath": vehicle.sensor.swath}
         given["sensor"] = {"kind": vehicle.sensor.kind} | swath | vehicle.sensor.parameters
+    if not vehicle.returns:
+        given["returns"] = False
     if vehicle.can:
         given["can"] = sorted(vehicle.can)
     return given

@@ -102,6 +102,8 @@ def _way(vehicle: Vehicle, lines: Lines, road: Roadmap) -> tuple[np.ndarray, lis
     points: list[tuple[float, float]] = [vehicle.start]
     legs: list[Leg] = ["start"]
     tracks = lines.driven
+    if not tracks and not vehicle.returns:
+        return np.array(points), legs, []
     if not tracks:
         home = shortest_paths(road, np.array(vehicle.start), np.array(vehicle.home))[1][0][0]
         if home is None:
@@ -120,6 +122,8 @@ def _way(vehicle: Vehicle, lines: Lines, road: Roadmap) -> tuple[np.ndarray, lis
         kinds: list[Leg] = ["survey"] * (len(track) - 1) if i < len(lines.laps) else ["transit", "survey", "transit"]
         for point, kind in zip(track[1:].tolist(), kinds, strict=True):
             _add(points, legs, point, kind)
+    if not vehicle.returns:
+        return np.array(points), legs, []
     for point in way_home[1:].tolist():
         _add(points, legs, point, "transit")
     return np.array(points), legs, []

@@ -111,7 +111,7 @@ def _fleet(mission: Mission) -> list[dict[str, Any]]:
     features = []
     for i, v in enumerate(mission.vehicles):
         given: dict[str, Any] = {"model": _plain(asdict(v.model))} | {n: getattr(v, n) for n in VEHICLE_FIGURES}
-        given |= {"sensor": asdict(v.sensor) if v.sensor else None, "can": sorted(v.can)}
+        given |= {"sensor": asdict(v.sensor) if v.sensor else None, "can": sorted(v.can), "returns": v.returns}
         given |= {"end": _point(frame, v.end) if v.end else None, "marker-color": COLOURS[i % len(COLOURS)]}
         features.append(
             _feature("vehicle", {"type": "Point", "coordinates": _point(frame, v.start)}, v.id, **_plain(given))
@@ -247,6 +247,7 @@ def _vehicle(feature: dict[str, Any], frame: Frame) -> Vehicle:
         end=_metres(given["end"], frame) if given["end"] else None,
         sensor=Sensor(**given["sensor"]) if given["sensor"] else None,
         can=frozenset(given["can"]),
+        returns=given["returns"],
         **figures,
     )
 

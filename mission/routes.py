@@ -92,6 +92,8 @@ def _linked(vehicle: Vehicle, lines: Sequence[np.ndarray], road: Roadmap) -> tup
         points += [way[1:], line[1:]]
         legs.extend(["transit"] * (len(way) - 1))
         legs.extend(["survey"] * (len(line) - 1))
+    if not vehicle.returns:
+        return np.concatenate(points), legs, missing
     way = shortest_paths(road, points[-1][-1], np.array(vehicle.home))[1][0][0]
     if way is None:
         missing.append(f"{vehicle.id}: no way from its region to its end; move the end, or lessen its clearance")

@@ -129,7 +129,8 @@ def _time(vehicle: Vehicle, lines: Sequence[np.ndarray]) -> float:
     for line in lines:
         metres += float(np.hypot(*(line[0] - here))) + _length(line)
         here = line[-1]
-    return (metres + float(np.hypot(*(np.array(vehicle.home) - here)))) / vehicle.speed
+    home = float(np.hypot(*(np.array(vehicle.home) - here))) if vehicle.returns else 0.0
+    return (metres + home) / vehicle.speed
 
 
 def _length(line: np.ndarray) -> float:

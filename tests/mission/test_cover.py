@@ -143,3 +143,13 @@ def test_refusals(change, words):
     spacing = change.pop("spacing", None)
     with pytest.raises(InputError, match=words):
         cover(replace(scenario, **change), spacing=spacing)
+
+
+def test_one_way():
+    """A vehicle that does not return stays where its last track ends; the others come home; the PLAN keeps it."""
+    scenario = read_scenario(DATA / "plant_yard.geojson")
+    one, other = scenario.vehicles
+    mission = cover(replace(scenario, vehicles=(replace(one, returns=False), other)))
+    assert mission.routes[0].waypoints[-1].leg in ("survey", "turn")
+    assert np.allclose(mission.routes[1].xyz[-1, :2], other.home)
+    assert '"returns": false' in plan_text(mission)
