@@ -92,7 +92,8 @@ def place(
     `annealed` is Algorithm 1 with its two misprints corrected (it maximises, and keeps the best state ever met), then
     refined; `paper` the algorithm as printed, which counts a node when its centre is inside; `none` leaves the lattice at
     the corner of the bounding box. `angle` in radians fixes the rotation. Every track of the grid returned is inside the
-    area, whatever the method. Raises InputError if the area holds no hypervertex at this spacing.
+    area, whatever the method. Raises InputError if the area holds no hypervertex at this spacing, or its
+    box too many path cells to hold, as that of areas far apart.
     """
     if not (np.isfinite(spacing) and spacing > 0):
         raise InputError(f"spacing {spacing:g} must be a positive number of metres")
@@ -104,6 +105,11 @@ def place(
         raise InputError(f"the area is narrower than a track everywhere at spacing {spacing:g} m; choose a smaller spacing")
     centre = edges[:, :2].mean(axis=0)
     edges = (edges - np.tile(centre, 2)) / spacing
+    if (cells := _most_cells(edges, angle)) > MAX_CELLS:
+        raise InputError(
+            f"the area's box has up to {cells:,} path cells at spacing {spacing:g} m, more than {MAX_CELLS:,}; "
+            "choose a larger spacing, or plan what is far apart one by one"
+        )
     target = (area.area / spacing**2, objective.k1, objective.k2, objective.k3)
     less = min(1.0, DEAR / target[0])
     annealing = replace(annealing, k=math.ceil(less * annealing.k), refined=math.ceil(less * annealing.refined))
@@ -126,6 +132,16 @@ def place(
         raise InputError(f"the area holds no 2 x 2 path cells at spacing {spacing:g} m; choose a smaller spacing")
     _prove(grid, area)
     return Placement(grid, f, f1, f2, f3, tried)
+
+
+MAX_CELLS = 256_000_000  # path cells of a lattice's box, free or not: the search and the grid hold bytes for each
+
+
+def _most_cells(edges: np.ndarray, angle: float | None) -> int:
+    """Return the path cells of the area's largest box, over the directions that the lattice may have."""
+    directions = np.linspace(0.0, np.pi / 2, 64) if angle is None else [angle]
+    boxes = (np.ptp(turned(edges, d, 1.0).reshape(-1, 2), axis=0) for d in directions)
+    return int(max(width * height for width, height in boxes))
 
 
 def _prove(grid: Grid, area: MultiPolygon) -> None:

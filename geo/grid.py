@@ -8,11 +8,9 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import maximum_bipartite_matching
 from shapely import MultiPolygon
 
-from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scanline import inside
 
 TOLERANCE = 1e-6  # of the spacing: tracks keep this far inside, so that exact predicates agree in every frame
-MAX_CELLS = 128_000_000  # path cells of a lattice, free or not: several arrays hold a byte for each
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,19 +47,13 @@ def lay_grid(area: MultiPolygon, spacing: float, angle: float, shift: tuple[floa
     """Lay a lattice at `angle` over `area`, a corner at `shift` (x, y) metres in its own axes, modulo 2 `spacing`.
 
     Where a sliver lies between two adjacent hypervertices, the fewest are dropped that leave no such pair (a minimum
-    vertex cover, which in a bipartite graph follows from a maximum matching: König's theorem). Raises InputError if the
-    lattice's box has more than `MAX_CELLS`, as of areas far apart.
+    vertex cover, which in a bipartite graph follows from a maximum matching: König's theorem).
     """
     edges = turned(area_edges(area, spacing), angle, spacing) - np.tile(shift, 2) / spacing
     corners = edges.reshape(-1, 2) if len(edges) else np.ones((1, 2))
     low, high = 2.0 * np.floor(corners.min(axis=0) / 2.0), 2.0 * np.ceil(corners.max(axis=0) / 2.0)
     edges -= np.tile(low, 2)
     columns, rows = (high - low).astype(int)
-    if columns * rows > MAX_CELLS:
-        raise InputError(
-            f"the areas' box has {columns * rows:,} path cells at spacing {spacing:g} m, more than {MAX_CELLS:,}; "
-            "choose a larger spacing, or plan areas that are far apart one by one"
-        )
     cells, right = inside(edges, rows, columns)
     cells_by_column, up = inside(edges[:, [1, 0, 3, 2]], columns, rows)
     cells &= cells_by_column.T

@@ -22,7 +22,8 @@ DEFAULT_MODEL = {"surface": "otter", "ground": "husky", "aerial": "survey-quad"}
 class VehicleModel:
     """What is true of every vehicle of a kind: `length`, `width` m; `speed` cruise and `max_speed` m/s; `turn_radius` m
     at cruise (0: turns on the spot); `turn_rate` rad/s when it turns on the spot; `acceleration` m/s2; `climb_rate` m/s;
-    `clearance` m kept from obstacles; `battery` Wh; `power_idle` W at rest or hovering; `power_cruise` W at cruise.
+    `clearance` m kept from obstacles; `battery` Wh; `power_idle` W at rest or hovering; `power_cruise` W at cruise;
+    `file` is the path it was read from, none for a packaged model.
     """
 
     name: str
@@ -43,6 +44,7 @@ class VehicleModel:
     climb_rate: float = 0.0
     altitude: float = 0.0
     dynamics: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    file: str = ""
 
     def power(self, speed: float) -> float:
         """Return watts drawn at `speed` m/s: idle plus a power law through the cruise figure."""
@@ -72,7 +74,7 @@ def load_model(name: str) -> VehicleModel:
         hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(model_names())}"
         raise InputError(f"unknown vehicle model {name!r}; {hint}")
     try:
-        return _model(tomllib.loads(text))
+        return _model(tomllib.loads(text), name if name.endswith(".toml") else "")
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"vehicle file {name}: not valid TOML: {error}") from None
     except InputError as error:
@@ -84,7 +86,7 @@ _ENERGY = ("battery", "power_idle", "power_cruise", "power_exponent")
 _MAY_BE_ZERO = ("turn_radius", "clearance", "power_idle", "power_exponent", "climb_rate", "altitude")
 
 
-def _model(document: dict[str, Any]) -> VehicleModel:
+def _model(document: dict[str, Any], file: str) -> VehicleModel:
     for key in ("name", "domain", "source"):
         if not isinstance(document.get(key), str):
             raise InputError(f"{key!r} must be a text")
@@ -111,6 +113,7 @@ def _model(document: dict[str, Any]) -> VehicleModel:
         domain=document["domain"],
         source=document["source"],
         dynamics=document["dynamics"],
+        file=file,
         **figures,
     )
 

@@ -138,6 +138,7 @@ def _read(data: bytes, name: str, frame: Frame | None = None) -> tuple[Scenario 
         spacing=spacings[0] if spacings else None,
         input_hash=hashlib.sha256(data).hexdigest(),
     )
+    problems += _area_problems(features)
     problems += _vehicle_problems(features, scenario)
     problems += _task_problems(scenario)
     return (None if problems else scenario), problems
@@ -340,6 +341,16 @@ def _obstacle_parts(feature: dict[str, Any], shape: MultiPolygon) -> list[tuple[
     height = float(given.get("height") or 10.0)
     ids = [feature["id"]] if len(shape.geoms) == 1 else [f"{feature['id']}/{i}" for i in range(len(shape.geoms))]
     return [(i, part, blocks, height) for i, part in zip(ids, shape.geoms, strict=True)]
+
+
+def _area_problems(features: Sequence[dict[str, Any]]) -> list[str]:
+    problems: list[str] = []
+    seen: dict[str, str] = {}
+    for f in (f for f in features if f["role"] == "area"):
+        if f["id"] in seen:
+            problems.append(f"{f['place']}: the id {f['id']!r} belongs to {seen[f['id']]} too; give each its own")
+        seen[f["id"]] = f["place"]
+    return problems
 
 
 def _vehicle_problems(features: Sequence[dict[str, Any]], scenario: Scenario) -> list[str]:

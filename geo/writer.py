@@ -1,6 +1,7 @@
 """From a `Scenario` back to a site's GeoJSON: what `read_scenario` reads, in degrees with 9 decimals."""
 
 import json
+import math
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from shapely.geometry import mapping
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.scenario import Scenario, Task, Vehicle
 
+UNLIMITED = 1e11  # s or Wh: a site says it with a number, for JSON has no infinity
 _LOOK = {"area": "#2b8cbe", "operating": "#555555", "obstacle": "#a63603"}
 _MARK = {"red": "#d62728", "yellow": "#f2c200", "green": "#2ca02c", "grey": "#7f7f7f", "black": "#000000"}
 
@@ -37,10 +39,12 @@ def site_text(scenario: Scenario) -> str:
 
 
 def _vehicle(frame: Frame, vehicle: Vehicle) -> dict[str, Any]:
-    given: dict[str, Any] = {"model": vehicle.model.name, "domain": vehicle.domain}
+    given: dict[str, Any] = {"model": vehicle.model.file or vehicle.model.name, "domain": vehicle.domain}
     given |= {n: getattr(vehicle, n) for n in ("speed", "turn_radius", "clearance")}
     given |= {n: v for n in ("share", "range") if (v := getattr(vehicle, n)) is not None}
-    given |= {n: v for n in ("endurance", "battery") if 0 < (v := getattr(vehicle, n)) < float("inf")}
+    if vehicle.endurance < math.inf:  # without it, it is unlimited; without a battery it is the model's
+        given["endurance"] = vehicle.endurance
+    given["battery"] = min(vehicle.battery, UNLIMITED)
     if vehicle.altitude > 0:
         given["altitude"] = vehicle.altitude
     if vehicle.end is not None:
@@ -63,8 +67,8 @@ def _task(task: Task) -> dict[str, Any]:
         given["needs"] = sorted(task.needs)
     if task.domain is not None:
         given["domain"] = task.domain
-    if task.window[1] < float("inf"):
-        given["window"] = list(task.window)
+    if task.window != (0.0, math.inf):
+        given["window"] = [task.window[0], min(task.window[1], UNLIMITED)]
     return given
 
 

@@ -16,7 +16,6 @@ from quarterdeck.mission.mission import Leg, Mission, Route
 from quarterdeck.mission.timing import shortfalls, timed_route
 
 LEAST_WORK = 1.0  # m: a sortie that gets no farther along the route than this is none
-Place = np.ndarray | tuple[float, float]
 _MOST = 1000  # sorties: more is a mistake of units
 
 

@@ -80,6 +80,12 @@ def test_an_angle_that_is_no_number(tmp_path, capsys, angle):
     assert "angle" in refused(capsys, "plan", site, "--spacing", "80", "--angle", angle, "-o", tmp_path / "plan.geojson")
 
 
+def test_two_areas_of_one_id(tmp_path, capsys):
+    """A second area of the same id is named, with the first."""
+    path = changed(tmp_path, "dalian_harbour", lambda f: f.append(next(a for a in f if a["properties"]["role"] == "area")))
+    assert "too; give each its own" in refused(capsys, "plan", path, "-o", tmp_path / "plan.geojson")
+
+
 def test_properties_that_are_a_list(tmp_path, capsys):
     """`check` names the feature."""
     path = changed(tmp_path, "dalian_harbour", lambda f: f[0].update(properties=[1]))

@@ -61,7 +61,7 @@ def test_areas_too_far_apart_for_one_grid():
     site = Site(areas, MultiPolygon([box(-4e4, -4e4, 4e4, 4e4)]))
     boat = Vehicle("a", load_model("otter"), (-35e3, -35e3), speed=1.0, battery=1e6, clearance=0.0)
     with pytest.raises(InputError, match="one by one"):
-        cover(Scenario("far", Frame(10.0, 54.0), site, (boat,)), spacing=0.5, placement="none")
+        cover(Scenario("far", Frame(10.0, 54.0), site, (boat,)), spacing=0.5)
 
 
 def test_published_shares():
