@@ -5,7 +5,7 @@ not by equal numbers of waypoints.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,15 +39,39 @@ def sorties(mission: Mission) -> tuple[Mission, ...]:
     return tuple(made)
 
 
+@dataclass(frozen=True, slots=True)
+class _Work:
+    """What is between a route's way out and its way home: (n, 3) points in metres; the kind of the leg that ends at each,
+    seconds waited and task there, its speed as a part of the vehicle's. `delay` is seconds waited before launch, `height`
+    the metres above ground of its transits.
+    """
+
+    points: np.ndarray
+    legs: Sequence[Leg]
+    holds: Sequence[float]
+    tasks: Sequence[str | None]
+    paces: Sequence[float]
+    delay: float
+    height: float
+
+
 def _split(mission: Mission, route: Route) -> list[Route]:
     vehicle = mission.vehicle(route.vehicle)
     if not shortfalls(vehicle, route):
         return [route]
     road = roadmap(mission.site.navigable(vehicle.domain, vehicle.clearance))
-    first, last = _work(route)
+    first, last = _busy(route)
     some = route.waypoints[first:last]
     points, legs = route.xyz[first:last], [w.leg for w in some]
-    holds, tasks = [w.hold for w in some], [w.task for w in some]
+    work = _Work(
+        points,
+        legs,
+        [w.hold for w in some],
+        [w.task for w in some],
+        _paces(vehicle, route)[first:last],
+        route.waypoints[0].hold,
+        max((w.z for w in route.waypoints if w.leg == "transit"), default=float(route.xyz[:, 2].max())),
+    )
     done: list[Route] = []
     first, here = 0, None  # the next waypoint to make for, and where the last sortie broke off
     while first < len(points):
@@ -56,11 +80,11 @@ def _split(mission: Mission, route: Route) -> list[Route]:
         low, high = first, len(points)
         while low < high:  # greatest number of waypoints that a sortie can hold; more waypoints never cost less
             middle = (low + high + 1) // 2
-            trial = _sortie(vehicle, road, points, legs, holds, tasks, first, middle, here, None)
+            trial = _sortie(vehicle, road, work, first, middle, here, None)
             low, high, best = (middle, high, trial) if not shortfalls(vehicle, trial) else (low, middle - 1, best)
         stop = None
         if low < len(points):
-            stop, partial = _farthest(vehicle, road, points, legs, holds, tasks, first, low, here)
+            stop, partial = _farthest(vehicle, road, work, first, low, here)
             best = partial or best
         if best is None or (low == first and stop is None) or len(done) >= _MOST:
             raise InputError(f"{vehicle.id}: cannot reach its work and come home on one battery; start it nearer")
@@ -72,7 +96,7 @@ def _split(mission: Mission, route: Route) -> list[Route]:
     return done
 
 
-def _work(route: Route) -> tuple[int, int]:
+def _busy(route: Route) -> tuple[int, int]:
     """The waypoints between the way out and the way home: from the first survey leg or task to the last."""
     busy = [i for i, w in enumerate(route.waypoints) if i and (w.leg == "survey" or w.task is not None or w.hold > 0)]
     if not busy:
@@ -80,27 +104,33 @@ def _work(route: Route) -> tuple[int, int]:
     return max(busy[0] - (route.waypoints[busy[0]].leg == "survey"), 0), busy[-1] + 1
 
 
+def _paces(vehicle: Vehicle, route: Route) -> list[float]:
+    """The speed of each level leg as a part of the vehicle's; a climb has its own."""
+    step = np.diff(route.xyz, axis=0, prepend=route.xyz[:1])
+    level = (np.hypot(step[:, 0], step[:, 1]) > 0) & (step[:, 2] == 0)
+    speeds = np.array([w.speed for w in route.waypoints])
+    return np.where(level & (speeds > 0), speeds / vehicle.speed, 1.0).tolist()
+
+
 def _farthest(
     vehicle: Vehicle,
     road: Roadmap,
-    points: np.ndarray,
-    legs: Sequence[Leg],
-    holds: Sequence[float],
-    tasks: Sequence[str | None],
+    work: _Work,
     first: int,
     last: int,
     here: np.ndarray | None,
 ) -> tuple[np.ndarray | None, Route | None]:
     """The place on the leg to waypoint `last` where the sortie has to turn home, to a metre, and that sortie; or None."""
+    points = work.points
     begin = points[last - 1] if last > first else here
-    if begin is None or legs[last] != "survey":  # a transit is not worth breaking
+    if begin is None or work.legs[last] != "survey":  # a transit is not worth breaking
         return None, None
     leg = points[last] - begin
     found: tuple[np.ndarray | None, Route | None] = (None, None)
     low, high = 0.0, 1.0
     while (high - low) * np.linalg.norm(leg) > LEAST_WORK:
         middle = (low + high) / 2
-        trial = _sortie(vehicle, road, points, legs, holds, tasks, first, last, here, begin + middle * leg)
+        trial = _sortie(vehicle, road, work, first, last, here, begin + middle * leg)
         if shortfalls(vehicle, trial):
             high = middle
         else:
@@ -111,43 +141,44 @@ def _farthest(
 def _sortie(
     vehicle: Vehicle,
     road: Roadmap,
-    points: np.ndarray,
-    legs: Sequence[Leg],
-    holds: Sequence[float],
-    tasks: Sequence[str | None],
+    work: _Work,
     first: int,
     last: int,
     here: np.ndarray | None,
     stop: np.ndarray | None,
 ) -> Route:
     """By the shortest way to `here` (or waypoint `first`), waypoints up to `last`, maybe on to `stop`, home."""
-    places: list[np.ndarray] = [points[first:last]]
-    kinds: list[Leg] = list(legs[first:last])
-    waits, names = list(holds[first:last]), list(tasks[first:last])
+    places: list[np.ndarray] = [work.points[first:last]]
+    kinds: list[Leg] = list(work.legs[first:last])
+    waits, names, pace = list(work.holds[first:last]), list(work.tasks[first:last]), list(work.paces[first:last])
     if here is not None:
         places.insert(0, here[None])
-        kinds, waits, names = ["transit", *kinds], [0.0, *waits], [None, *names]
+        kinds, waits, names, pace = ["transit", *kinds], [0.0, *waits], [None, *names], [1.0, *pace]
     if stop is not None:
         places.append(stop[None])
-        kinds, waits, names = [*kinds, "survey"], [*waits, 0.0], [*names, None]
+        kinds, waits, names, pace = [*kinds, "survey"], [*waits, 0.0], [*names, None], [*pace, work.paces[last]]
     way = np.concatenate(places)
-    height = way[0, 2]
-    out = _transit(road, vehicle.start, way[0, :2], height)[:-1]
-    home = _transit(road, way[-1, :2], vehicle.home, way[-1, 2])[1:]
+    out = _transit(road, vehicle.start, way[0, :2], work.height)
+    home = _transit(road, way[-1, :2], vehicle.home, work.height)
+    # Where the work is at another height, the vehicle changes it on the spot.
+    out = out[:-1] if way[0, 2] == work.height else out
+    home = home[1:] if way[-1, 2] == work.height else home
     if here is None and len(kinds):
-        kinds[0] = "transit"
+        kinds[0], pace[0] = "transit", 1.0
     xyz = np.concatenate([out, way, home])
     every: list[Leg] = [*["transit"] * len(out), *kinds, *["transit"] * len(home)]  # type: ignore[list-item]
     waits = [*[0.0] * len(out), *waits, *[0.0] * len(home)]
     names = [*[None] * len(out), *names, *[None] * len(home)]
+    pace = [*[1.0] * len(out), *pace, *[1.0] * len(home)]
     if vehicle.domain == "aerial":
         ground = [np.array([[*vehicle.start, 0.0]]), np.array([[*vehicle.home, 0.0]])]
         xyz = np.concatenate([ground[0], xyz, ground[1]])
         every = ["start", "takeoff", *every[1:], "landing"]
-        waits, names = [0.0, *waits, 0.0], [None, *names, None]
+        waits, names, pace = [0.0, *waits, 0.0], [None, *names, None], [1.0, *pace, 1.0]
     else:
         every[0] = "start"
-    return timed_route(vehicle, xyz, every, holds=waits, tasks=names)
+    waits[0] = work.delay
+    return timed_route(vehicle, xyz, every, holds=waits, tasks=names, pace=pace)
 
 
 def _transit(

@@ -74,3 +74,24 @@ def test_work_out_of_reach_is_told():
     """An endurance that does not even cover the way out and home is one line."""
     with pytest.raises(InputError, match="cannot reach its work"):
         sorties(survey("surface", 120.0))
+
+
+def test_sorties_keep_height_pace_and_delay():
+    """As planned: transits in their layer above the survey, a slow leg slow, the launch after the same wait."""
+    whole = survey("aerial", 500.0)
+    (vehicle,), (route,) = whole.vehicles, whole.routes
+    xyz, legs = route.xyz, [w.leg for w in route.waypoints]
+    out, home = [[0, 0, 0], [0, 0, 45], [*xyz[1, :2], 45], xyz[1]], [[*xyz[-2, :2], 45], [0, 0, 45], [0, 0, 0]]
+    points = np.array([*out, *xyz[2:-1], *home], dtype=float)
+    legs = ["start", "takeoff", "transit", "transit", *legs[2:-1], "transit", "transit", "landing"]
+    pace, holds = np.where(np.array(legs) == "survey", 0.5, 1.0), [20.0] + [0.0] * (len(points) - 1)
+    made = sorties(replace(whole, routes=(timed_route(vehicle, points, legs, pace=pace, holds=holds),)))
+    assert len(made) > 1
+    for (sortie,) in (m.routes for m in made):
+        way = sortie.waypoints
+        assert way[0].hold == 20.0
+        assert all(w.speed == pytest.approx(0.5 * vehicle.speed) for w in way if w.leg == "survey")
+        first, last = np.flatnonzero(sortie.survey)[[0, -1]]
+        assert [w.z for w in way[1 : first - 1]] == [45.0] * (first - 2)
+        assert [w.z for w in way[last + 1 : -1]] == [45.0] * (len(way) - last - 2)
+        assert sortie.duration <= 500.0 * (1 - RESERVE) + 1e-6
