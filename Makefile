@@ -41,6 +41,9 @@ bench-assign: $(VENV)/installed
 bench-triage: $(VENV)/installed
 	$(BIN)/python benchmarks/triage.py
 
+soak: $(VENV)/installed  ## damaged input by the hundred thousand: hours
+	$(BIN)/python -m pytest tests/soak --soak 50000
+
 docs: $(VENV)/installed  ## what is generated in docs/: the format of sites
 	$(BIN)/python docs/generate.py
 
