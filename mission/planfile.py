@@ -172,7 +172,7 @@ def read_plan(source: str | Path) -> Mission:
             raise InputError(f"is a PLAN of format {headers[0].get('format')}, this version reads {FORMAT}; plan it again")
         try:
             return _mission(str(document.get("name", "")), headers[0], features)
-        except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        except (KeyError, TypeError, ValueError, OverflowError, IndexError, AttributeError) as error:
             what = f"{error} is missing" if isinstance(error, KeyError) else " ".join(str(error).split())[:120]
             raise InputError(f"is a damaged PLAN ({what}); plan it again") from None
     except InputError as error:
