@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from shapely import MultiPolygon, Polygon, get_coordinates, orient_polygons, set_coordinates
+from shapely.errors import ShapelyError
 from shapely.geometry import mapping, shape
 
 from quarterdeck.geo.errors import InputError
@@ -25,6 +26,7 @@ from quarterdeck.mission.mission import Layer, Mission, Route, Waypoint
 
 FORMAT = 1
 COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#ff7f0e", "#9467bd", "#8c564b", "#e377c2", "#17becf", "#bcbd22", "#7f7f7f")
+DAMAGE = (KeyError, TypeError, ValueError, OverflowError, IndexError, AttributeError, ShapelyError)
 LISTS = ("leg", "speed", "hold", "time", "task")  # of a route's waypoints, in the order of its positions
 
 
@@ -172,7 +174,7 @@ def read_plan(source: str | Path) -> Mission:
             raise InputError(f"is a PLAN of format {headers[0].get('format')}, this version reads {FORMAT}; plan it again")
         try:
             return _mission(str(document.get("name", "")), headers[0], features)
-        except (KeyError, TypeError, ValueError, OverflowError, IndexError, AttributeError) as error:
+        except DAMAGE as error:
             what = f"{error} is missing" if isinstance(error, KeyError) else " ".join(str(error).split())[:120]
             raise InputError(f"is a damaged PLAN ({what}); plan it again") from None
     except InputError as error:
