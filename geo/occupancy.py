@@ -142,8 +142,16 @@ def write_map(occupancy: Occupancy, path: Path, *, force: bool = False) -> Path:
     Image.fromarray(grey[::-1]).save(buffer, format="PPM")
     write_file(picture, buffer.getvalue(), force=force)
     x, y = occupancy.origin
-    text = f"image: {picture.name}\nresolution: {occupancy.resolution!r}\norigin: [{x!r}, {y!r}, {occupancy.yaw!r}]\n"
-    return write_file(path, text + "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n", force=force)
+    document = {
+        "image": picture.name,
+        "resolution": float(occupancy.resolution),
+        "origin": [float(x), float(y), float(occupancy.yaw)],
+        "negate": 0,
+        "occupied_thresh": 0.65,
+        "free_thresh": 0.196,
+    }
+    # PyYAML's own numbers: 1e-12 would be read back as a text, 1.0e-12 is not.
+    return write_file(path, yaml.safe_dump(document, sort_keys=False, default_flow_style=None), force=force)
 
 
 def _number(path: Path, document: dict[str, Any], key: str, default: float | None = None) -> float:

@@ -26,7 +26,7 @@ from quarterdeck.mission.mission import Layer, Mission, Route, Waypoint
 
 FORMAT = 1
 COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#ff7f0e", "#9467bd", "#8c564b", "#e377c2", "#17becf", "#bcbd22", "#7f7f7f")
-DAMAGE = (KeyError, TypeError, ValueError, OverflowError, IndexError, AttributeError, ShapelyError)
+DAMAGE = (KeyError, TypeError, ValueError, ArithmeticError, IndexError, AttributeError, ShapelyError)
 LISTS = ("leg", "speed", "hold", "time", "task")  # of a route's waypoints, in the order of its positions
 
 
@@ -173,7 +173,8 @@ def read_plan(source: str | Path) -> Mission:
         if headers[0].get("format") != FORMAT:
             raise InputError(f"is a PLAN of format {headers[0].get('format')}, this version reads {FORMAT}; plan it again")
         try:
-            return _mission(str(document.get("name", "")), headers[0], features)
+            with np.errstate(all="raise"):
+                return _mission(str(document.get("name", "")), headers[0], features)
         except DAMAGE as error:
             what = f"{error} is missing" if isinstance(error, KeyError) else " ".join(str(error).split())[:120]
             raise InputError(f"is a damaged PLAN ({what}); plan it again") from None
