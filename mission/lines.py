@@ -73,7 +73,7 @@ def plan_lines(
     del figures["turns"], figures["turns_per_1000_m2"], figures["cell_poc"]  # of lanes of a grid; there is none here
     figures |= {
         "lines": sum(len(lines.swaths) for lines in laid),
-        "laps": sum(len(lines.laps) for lines in laid),
+        **({"laps": sum(len(lines.laps) for lines in laid)} if lap else {}),
         "makespan": max(r.duration for r in routes),
         "energy": sum(r.energy for r in routes),
         "notes": notes,
