@@ -164,8 +164,9 @@ def read_plan(source: str | Path) -> Mission:
     Raises InputError if it is no plan, or a part of it is missing or damaged.
     """
     name = "standard input" if str(source) == "-" else str(source)
+    data = read_bytes(source)
     try:
-        document = parse(read_bytes(source))
+        document = parse(data)
         features = [f for f in document["features"] if isinstance(f, dict) and isinstance(f.get("properties"), dict)]
         headers = [f["properties"] for f in features if f["properties"].get("role") == "plan"]
         if not headers:
