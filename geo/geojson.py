@@ -22,7 +22,25 @@ def parse(data: bytes) -> dict[str, Any]:
 
     Raises InputError if it is not JSON (RFC 8259: no NaN), not GeoJSON, or in another system than WGS84.
     """
-    data = as_geojson(data)
+    document = parse_json(as_geojson(data))
+    if isinstance(document, dict) and document.get("type") == "Feature":
+        document = {"type": "FeatureCollection", "features": [document]}
+    if not isinstance(document, dict) or document.get("type") != "FeatureCollection":
+        kind = document.get("type") if isinstance(document, dict) else type(document).__name__
+        raise InputError(f"expected a GeoJSON FeatureCollection, found {kind!r}; export the layer as GeoJSON")
+    if not isinstance(document.get("features"), list) or not document["features"]:
+        raise InputError('"features" must be a list with at least one feature')
+    crs = document.get("crs")
+    name = crs
+    if isinstance(crs, dict):
+        name = crs["properties"].get("name") if isinstance(crs.get("properties"), dict) else None
+    if crs is not None and name not in WGS84_NAMES:
+        raise InputError(f"crs {str(name)[:60]!r} is not WGS84; export it as EPSG:4326 (longitude, latitude)")
+    return document
+
+
+def parse_json(data: bytes) -> Any:
+    """Return the JSON in `data`. Raises InputError if it is none (RFC 8259: no NaN), or has text that no file can hold."""
     try:
         document = json.loads(data.decode("utf-8-sig"), parse_constant=_refuse_constant)
     except UnicodeDecodeError:
@@ -37,19 +55,6 @@ def parse(data: bytes) -> dict[str, Any]:
         raise InputError("not GeoJSON: nested too deeply") from None
     if b"\\ud" in data.lower() and _SURROGATE.search(json.dumps(document, ensure_ascii=False)):
         raise InputError("a text has half of a surrogate pair (\\ud800 to \\udfff), which no file can hold; take it out")
-    if isinstance(document, dict) and document.get("type") == "Feature":
-        document = {"type": "FeatureCollection", "features": [document]}
-    if not isinstance(document, dict) or document.get("type") != "FeatureCollection":
-        kind = document.get("type") if isinstance(document, dict) else type(document).__name__
-        raise InputError(f"expected a GeoJSON FeatureCollection, found {kind!r}; export the layer as GeoJSON")
-    if not isinstance(document.get("features"), list) or not document["features"]:
-        raise InputError('"features" must be a list with at least one feature')
-    crs = document.get("crs")
-    name = crs
-    if isinstance(crs, dict):
-        name = crs["properties"].get("name") if isinstance(crs.get("properties"), dict) else None
-    if crs is not None and name not in WGS84_NAMES:
-        raise InputError(f"crs {str(name)[:60]!r} is not WGS84; export it as EPSG:4326 (longitude, latitude)")
     return document
 
 

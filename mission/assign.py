@@ -83,6 +83,7 @@ def assign(
             "shape_parameters": list(parameters),
             "tiers": tiers,
             "map": "given" if twin is not None else "site",
+            "resolution": resolution,
             "heuristic": heuristic,
             "iterations": iterations,
             "time_limit": time_limit,

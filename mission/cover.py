@@ -50,7 +50,8 @@ def cover(
     """
     step = covering(scenario, spacing)
     grid = place(trackable(scenario, step), step, seed=seed, method=placement, angle=angle).grid
-    return cover_grid(scenario, grid, edge=edge, seed=seed, parameters={"placement": placement})
+    parameters = {"spacing": step, "placement": placement, "angle": angle, "edge": edge}
+    return cover_grid(scenario, grid, edge=edge, seed=seed, parameters=parameters)
 
 
 def covering(scenario: Scenario, spacing: float | None) -> float:
@@ -69,7 +70,7 @@ def covering(scenario: Scenario, spacing: float | None) -> float:
 def cover_grid(
     scenario: Scenario, grid: Grid, *, edge: Edge = "cells", seed: int = 0, parameters: Mapping[str, Any] | None = None
 ) -> Mission:
-    """Return the mission that covers the hypervertices of a placed grid; `parameters` are told in it beside the grid's."""
+    """Return the mission that covers the hypervertices of a placed grid; `parameters` tell how it was."""
     vehicles, site, step = scenario.vehicles, scenario.site, grid.spacing
     roads = roadmaps(scenario)
     length = 4 * step * float(grid.hypervertices.sum())
@@ -90,6 +91,7 @@ def cover_grid(
     figures |= {
         "poc_with_turns": 1.0 - missed.area / site.coverable.area,
         "hypervertices": int(grid.hypervertices.sum()),
+        "lattice": {"angle": grid.angle, "origin": grid.origin},
         "makespan": max(r.duration for r in routes),
         "energy": sum(r.energy for r in routes),
         "shares": cells / max(1, cells.sum()),
@@ -103,8 +105,7 @@ def cover_grid(
         vehicles=vehicles,
         routes=routes,
         method="stc",
-        parameters={"spacing": step, "angle": grid.angle, "origin": list(grid.origin), "edge": edge}
-        | dict(parameters or {}),
+        parameters={"spacing": step, "edge": edge} | dict(parameters or {}),
         seed=seed,
         spacing=step,
         tasks=scenario.tasks,

@@ -55,23 +55,23 @@ def _header(mission: Mission) -> dict[str, Any]:
         seed=mission.seed,
         spacing=mission.spacing,
         origin=[mission.frame.lon, mission.frame.lat],
-        parameters=_plain(mission.parameters),
+        parameters=_plain(mission.parameters, digits=17),  # exactly: it is planned again with them
         figures=_plain(mission.figures),
         bounds=_plain(mission.bounds),
         input_hash=mission.input_hash,
     )
 
 
-def _plain(value: Any) -> Any:
-    """Return JSON's own types: numpy's become Python's, what is not finite becomes null, figures keep 12 digits."""
+def _plain(value: Any, digits: int = 12) -> Any:
+    """Return JSON's own types: numpy's become Python's, what is not finite becomes null, figures keep so many digits."""
     if isinstance(value, Mapping):
-        return {str(k): _plain(v) for k, v in value.items()}
+        return {str(k): _plain(v, digits) for k, v in value.items()}
     if isinstance(value, np.ndarray | list | tuple):
-        return [_plain(v) for v in (value.tolist() if isinstance(value, np.ndarray) else value)]
+        return [_plain(v, digits) for v in (value.tolist() if isinstance(value, np.ndarray) else value)]
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float):
-        return float(f"{value:.12g}") if math.isfinite(value) else None
+        return float(f"{value:.{digits}g}") if math.isfinite(value) else None
     return value
 
 

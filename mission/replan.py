@@ -79,7 +79,8 @@ def replan(mission: Mission, progress: Progress, changes: Changes = Changes(), *
         vehicles=vehicles,
         routes=routes,
         parameters=dict(mission.parameters) | {"replanned_at": progress.time, "lost": sorted(changes.lost)},
-        figures=_figures(scenario.site, mission.spacing, progress, vehicles, routes),
+        figures=_figures(scenario.site, mission.spacing, progress, vehicles, routes)
+        | {n: mission.figures[n] for n in ("lattice",) if n in mission.figures},
         bounds={},
         seed=mission.seed if seed is None else seed,
         reasons=(*_lasting(mission), *told, *reasons),
@@ -226,7 +227,7 @@ def _left(
     if changes.areas:
         fresh = replace(scenario, site=replace(scenario.site, areas=changes.areas))
         fresh = replace(fresh, vehicles=tuple(replace(v, share=None) for v in scenario.vehicles))
-        angle, edge = mission.parameters.get("angle"), mission.parameters.get("edge", "cells")
+        angle, edge = mission.figures.get("lattice", {}).get("angle"), mission.parameters.get("edge", "cells")
         added = cover(fresh, spacing=spacing, seed=seed, angle=angle, edge=edge)
         released += [run for r in added.routes for run in unbroken(r.xyz[:, :2], r.survey)]
         told = _lasting(added)

@@ -96,7 +96,7 @@ class VehicleReport:
 @dataclass(frozen=True, slots=True)
 class Report:
     """A run's figures, the limits that they were held against, and why it failed (`reasons`; it passed when there are
-    none).
+    none). `command` has the `options` of the command line that it came of, and the SHA-256 of the `files` among them.
     """
 
     mission: str
@@ -107,6 +107,7 @@ class Report:
     vehicles: tuple[VehicleReport, ...]
     reasons: tuple[str, ...]
     trace_hash: str
+    command: Mapping[str, Any] | None = None
 
     @property
     def passed(self) -> bool:

@@ -19,6 +19,7 @@ VERBS = {
     "init": "A small site to start from.",
     "plan": "Cover an area.",
     "replan": "From what has happened so far: losses, additions, withdrawals.",
+    "replay": "Run a report or a plan again, and compare.",
     "reproduce": "A paper's tables beside ours.",
     "simulate": "Execute a plan in PyBullet; report and verdict.",
     "triage": "Search, relay, treat; the four methods.",

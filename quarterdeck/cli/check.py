@@ -1,9 +1,8 @@
 """`quarterdeck check`: every problem of a site or a plan."""
 
-import io
-import sys
-
 import click
+
+from quarterdeck.cli.output import put_back
 
 
 @click.command(short_help="Every problem of a site or a plan.")
@@ -26,11 +25,11 @@ def command(file: str) -> int:
         from quarterdeck.mission.check import check_mission
         from quarterdeck.mission.planfile import read_plan
 
-        problems, status = list(check_mission(read_plan(_again(file, data)))), 1
+        problems, status = list(check_mission(read_plan(put_back(file, data)))), 1
     else:
-        problems, status = find_problems(_again(file, data)), 2
+        problems, status = find_problems(put_back(file, data)), 2
         if not problems:
-            vehicles = read_scenario(_again(file, data)).vehicles
+            vehicles = read_scenario(put_back(file, data)).vehicles
             try:
                 shares(vehicles) if vehicles else None
             except InputError as error:
@@ -40,10 +39,3 @@ def command(file: str) -> int:
     if not problems:
         click.echo(f"{file}: no problem found", err=True)
     return status if problems else 0
-
-
-def _again(file: str, data: bytes) -> str:
-    """Return `file`, its bytes put back where it is standard input, which gives them only once."""
-    if file == "-":
-        sys.stdin = io.TextIOWrapper(io.BytesIO(data), encoding="utf-8")
-    return file

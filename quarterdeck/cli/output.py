@@ -1,5 +1,7 @@
 """Where results and tables go: results to a file or standard output, tables and progress to standard error."""
 
+import hashlib
+import io
 import sys
 from pathlib import Path
 from typing import Any
@@ -10,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from quarterdeck.geo.files import refuse_existing, write_file
+from quarterdeck.geo.reader import read_bytes
 from quarterdeck.mission.mission import Mission
 
 
@@ -44,6 +47,20 @@ def emit(content: str | bytes, output: str, *, force: bool) -> None:
     else:
         sys.stdout.buffer.write(content)
     sys.stdout.flush()
+
+
+def put_back(file: str, data: bytes) -> str:
+    """Return `file`, its bytes put back where it is standard input, which gives them only once."""
+    if file == "-":
+        sys.stdin = io.TextIOWrapper(io.BytesIO(data), encoding="utf-8")
+    return file
+
+
+def digest(file: str) -> str:
+    """Return the SHA-256 of a file's bytes, which are put back where it is standard input. Raises InputError."""
+    data = read_bytes(file)
+    put_back(file, data)
+    return hashlib.sha256(data).hexdigest()
 
 
 def console() -> Console:

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from quarterdeck.cli.output import console, emit, force_option, minutes, not_there, print_reason, seed_option
+from quarterdeck.cli.output import console, digest, emit, force_option, minutes, not_there, print_reason, seed_option
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from quarterdeck.mission.mission import Mission
     from quarterdeck.physics.report import Report
+    from quarterdeck.physics.simulate import Run
+
+
+FILES = ("plan", "unmapped", "terrain")  # the options that are files to read
 
 
 class Vector(click.ParamType):
@@ -94,10 +99,37 @@ class Limit(click.ParamType):
 @click.option("--json", "as_json", is_flag=True, help="Write the report as JSON to standard output.")
 @force_option
 def command(
-    plan: str,
     report: str | None,
     rrd: str | None,
     picture: str | None,
+    as_json: bool,
+    force: bool,
+    **options: Any,
+) -> int:
+    """Execute PLAN (a file, or - for standard input) with the vehicles' real dynamics, and tell whether it holds.
+
+    Exit status 1 if the verdict fails.
+    """
+    mission, run = execute(**options)
+    if report:
+        emit(run.report.to_json(), report, force=force)
+    if rrd:
+        from quarterdeck.exporters.recording import recording
+
+        emit(recording(mission, run.trace), rrd, force=force)
+    if picture:
+        from quarterdeck.exporters.picture import picture as draw
+
+        emit(draw(mission, run.trace, run.report), picture, force=force)
+    if as_json:
+        emit(run.report.to_json(), "-", force=force)
+    print_report(mission, run.report)
+    return 0 if run.report.passed else 1
+
+
+def execute(
+    plan: str,
+    *,
     current: tuple[float, float],
     wind: tuple[float, float],
     gusts: float,
@@ -113,13 +145,9 @@ def command(
     seed: int,
     limits: tuple[tuple[str, float], ...],
     step: float,
-    as_json: bool,
-    force: bool,
-) -> int:
-    """Execute PLAN (a file, or - for standard input) with the vehicles' real dynamics, and tell whether it holds.
-
-    Exit status 1 if the verdict fails.
-    """
+) -> tuple[Mission, Run]:
+    """Execute a plan with the command's options; return its mission and the run, whose report tells them."""
+    options = dict(locals())
     from quarterdeck.geo.reader import read_obstacles
     from quarterdeck.mission.planfile import read_plan
     from quarterdeck.mission.recovery import recovering
@@ -127,6 +155,7 @@ def command(
     from quarterdeck.physics.simulate import simulate
     from quarterdeck.physics.terrain import read_terrain
 
+    files = {name: digest(options[name]) for name in FILES if options[name]}
     mission = read_plan(plan)
     strange = read_obstacles(unmapped, mission.frame) if unmapped else ()
     ground = read_terrain(terrain) if terrain else None
@@ -146,20 +175,8 @@ def command(
             limits=dict(limits),
             progress=progress,
         )
-    if report:
-        emit(run.report.to_json(), report, force=force)
-    if rrd:
-        from quarterdeck.exporters.recording import recording
-
-        emit(recording(mission, run.trace), rrd, force=force)
-    if picture:
-        from quarterdeck.exporters.picture import picture as draw
-
-        emit(draw(mission, run.trace, run.report), picture, force=force)
-    if as_json:
-        emit(run.report.to_json(), "-", force=force)
-    print_report(mission, run.report)
-    return 0 if run.report.passed else 1
+    command = {"options": options, "files": files}
+    return mission, replace(run, report=replace(run.report, command=command))
 
 
 @contextmanager

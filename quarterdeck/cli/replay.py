@@ -1,0 +1,172 @@
+"""`quarterdeck replay`: run a report, or a plan, again and compare."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import zip_longest
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from quarterdeck.cli.output import console, digest
+from quarterdeck.geo.errors import InputError
+
+if TYPE_CHECKING:
+    from quarterdeck.geo.scenario import Scenario
+    from quarterdeck.mission.mission import Mission
+
+    Differences = list[tuple[str, Any, Any]]
+
+SHOWN = 20  # differences that are printed; --json has all
+
+
+@click.command(short_help="Run a report or a plan again, and compare.")
+@click.argument("file")
+@click.option("--plan", help="The report's plan, where it does not lie where it lay.")
+@click.option("--site", help="The plan's site: it is planned again too, with its seed and parameters.")
+@click.option("--within", type=click.FloatRange(min=0), default=0.0, show_default=True,
+              help="Fraction by which numbers may differ, as between processors; 0: to the last digit.")  # fmt: skip
+@click.option("--json", "as_json", is_flag=True, help="Write all differences as JSON to standard output.")
+def command(file: str, plan: str | None, site: str | None, within: float, as_json: bool) -> int:
+    """Run again what FILE came of, and print what differs: a report of `simulate`, or with --site a plan.
+
+    Exit status 1 if anything does. Another version of Quarterdeck is told, and is no difference by itself.
+    """
+    document = _read(file)
+    found: Differences = []
+    if document["type"] == "FeatureCollection":
+        if site is None or plan is not None:
+            raise click.UsageError(f"{file} is a plan: name its site with --site, and no other plan")
+        found += plan_again(document, file, site, within)
+    else:
+        options, files = _recorded(document, file)
+        plan = plan or str(options.get("plan"))
+        if site is not None:
+            found += plan_again(_read(plan), plan, site, within)
+        found += report_again(document, options | {"plan": plan}, files, within)
+    if as_json:
+        click.echo(json.dumps([{"where": where, "was": was, "is": now} for where, was, now in found], indent=1))
+    screen = console()
+    for where, was, now in found[:SHOWN]:
+        screen.print(f"{where}: was {_short(was)}, is {_short(now)}", soft_wrap=True)
+    if len(found) > SHOWN:
+        screen.print(f"and {len(found) - SHOWN:,} more")
+    same = all(where.endswith("version") for where, _, _ in found)
+    screen.print(f"{file}: {'the same again' if same else 'not the same'}", soft_wrap=True)
+    return 0 if same else 1
+
+
+def _read(file: str) -> dict[str, Any]:
+    """Return a report or a plan as JSON. Raises InputError if it is neither."""
+    from quarterdeck.geo.geojson import parse_json
+    from quarterdeck.geo.reader import read_bytes
+
+    try:
+        document = parse_json(read_bytes(file))
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
+    if isinstance(document, dict) and document.get("type") in ("quarterdeck-report", "FeatureCollection"):
+        return document
+    raise InputError(f"{file}: is neither a report of `quarterdeck simulate` nor a plan")
+
+
+def _recorded(report: dict[str, Any], file: str) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return the options of the command that a report came of, and the hashes of its files."""
+    command = report.get("command")
+    parts = [command.get(name) for name in ("options", "files")] if isinstance(command, dict) else [None]
+    if not all(isinstance(part, dict) for part in parts):
+        raise InputError(f"{file}: does not tell the command that it came of; only those of `quarterdeck simulate` do")
+    return parts[0], parts[1]  # type: ignore[return-value]
+
+
+def report_again(report: dict[str, Any], options: dict[str, Any], files: dict[str, str], within: float) -> Differences:
+    """Simulate with a report's options and return what differs. Raises InputError if a file is not the one it was."""
+    from quarterdeck.cli import simulate
+
+    for name, was in files.items():
+        if digest(str(options.get(name))) != was:
+            raise InputError(f"{options[name]}: is not the {name} that the report was made with (another SHA-256)")
+    context = click.Context(simulate.command)
+    try:
+        given = {
+            p.name: p.type_cast_value(context, _tuples(options[p.name]))
+            for p in simulate.command.params
+            if p.name in options
+        }
+        _, run = simulate.execute(**given)
+    except (click.BadParameter, TypeError) as error:
+        raise InputError(f"the report's options cannot be used ({error}); simulate the plan again") from None
+    again = json.loads(replace(run.report, command=report["command"]).to_json())
+    found = differences(report, again, within)
+    return [d for d in found if not (within and d[0] == "trace_hash")]
+
+
+def plan_again(document: dict[str, Any], file: str, site: str, within: float) -> Differences:
+    """Plan a site again as a plan's header tells, and return what differs, by feature."""
+    from quarterdeck.geo.reader import read_scenario
+    from quarterdeck.mission.planfile import plan_text, read_plan
+
+    made = remade(read_plan(file), read_scenario(site), file, site)
+    return list(differences(_features(document), _features(json.loads(plan_text(made))), within))
+
+
+def remade(plan: Mission, scenario: Scenario, file: str, site: str) -> Mission:
+    """Return the mission that a plan's method, seed and parameters make of the scenario.
+
+    Raises InputError if the plan was not made of this site, or in a way that its header does not tell.
+    """
+    from quarterdeck.api import assign
+    from quarterdeck.api import plan as cover
+
+    if plan.input_hash != scenario.input_hash:
+        raise InputError(f"{site}: is not the site that {file} was made of (another SHA-256)")
+    options = dict(plan.parameters)
+    own_map = options.pop("map", "site") != "site"
+    if own_map or {"replanned_at", "sortie"} & set(options) or plan.method not in ("stc", "lines", "guards", "assign"):
+        raise InputError(f"{file}: was not made of a site alone (replanned, on a map, or by hand); plan it as it was")
+    scenario = replace(scenario, name=plan.name)
+    try:
+        if plan.method == "assign":
+            return assign(scenario, seed=plan.seed, **options)
+        return cover(scenario, method=plan.method, seed=plan.seed, **options)  # type: ignore[arg-type]
+    except TypeError as error:
+        raise InputError(f"{file}: its parameters cannot be used ({error}); plan the site again") from None
+
+
+def _features(document: dict[str, Any]) -> dict[str, Any]:
+    """Return a plan's features by a name that tells them: role, id or vehicle."""
+    named: dict[str, Any] = {}
+    for feature in document["features"]:
+        given = feature.get("properties") or {}
+        words = [given.get("role"), feature.get("id") or given.get("vehicle") or given.get("layer")]
+        name = " ".join(str(w) for w in words if w is not None)
+        named[f"{name} {len(named)}" if name in named else name] = feature
+    return named
+
+
+def differences(was: Any, now: Any, within: float = 0.0, where: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """Yield (place, was, is) for what differs in two JSON documents; numbers may by the fraction `within`."""
+    if isinstance(was, dict) and isinstance(now, dict):
+        for key in [*was, *(k for k in now if k not in was)]:
+            yield from differences(was.get(key), now.get(key), within, f"{where}.{key}" if where else key)
+    elif isinstance(was, list) and isinstance(now, list):
+        for i, (a, b) in enumerate(zip_longest(was, now)):
+            yield from differences(a, b, within, f"{where}[{i}]")
+    elif was != now and not (_number(was) and _number(now) and math.isclose(was, now, rel_tol=within, abs_tol=within)):
+        yield where, was, now
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= 60 else f"{text[:57]}..."
