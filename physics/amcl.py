@@ -117,7 +117,7 @@ def weigh_scan(
     belief: Belief, field: DistanceField, angles: np.ndarray, ranges: np.ndarray, params: FilterParams
 ) -> Belief:
     """Return the belief after a scan of (b,) `ranges` at `angles`, infinite where there was no echo."""
-    use = spread_beams(len(angles), params.beams)
+    use = _spread_echoes(ranges, params.beams)
     told, fit = log_likelihoods(
         field.values,
         field.origin,
@@ -128,7 +128,7 @@ def weigh_scan(
         params.hit,
         params.random_part,
     )
-    if np.count_nonzero(np.isfinite(ranges[use])) < SEEN * len(use):  # too little to tell whether it is lost
+    if np.count_nonzero(np.isfinite(ranges)) < SEEN * len(angles):  # too little to tell whether it is lost
         return Belief(belief.particles, _reweighed(belief.weights, told), belief.slow, belief.fast)
     mean = float(belief.weights @ fit)
     slow = belief.slow + params.slow * (mean - belief.slow) if belief.slow else mean
@@ -148,6 +148,12 @@ def weigh_fix(belief: Belief, fix: np.ndarray, deviation: float) -> Belief:
         particles[:, :2] -= belief.weights @ away
         return Belief(particles, belief.weights, belief.slow, belief.fast)
     return Belief(belief.particles, _reweighed(belief.weights, -square / 2), belief.slow, belief.fast)
+
+
+def weigh_heading(belief: Belief, heading: float, deviation: float) -> Belief:
+    """Return the belief after a heading fix with normal `deviation`, both radians, as a compass gives it."""
+    off = wrap(belief.particles[:, 2] - heading)
+    return Belief(belief.particles, _reweighed(belief.weights, -((off / deviation) ** 2) / 2), belief.slow, belief.fast)
 
 
 def lostness(belief: Belief) -> float:
@@ -215,7 +221,7 @@ def estimate(belief: Belief) -> Estimate:
 
 def weakest(pose: np.ndarray, field: DistanceField, angles: np.ndarray, ranges: np.ndarray, params: FilterParams) -> float:
     """Return metres: the deviation that one scan leaves in the least certain direction; infinite if it sees too little."""
-    use = spread_beams(len(angles), params.beams)
+    use = _spread_echoes(ranges, params.beams)
     told = scan_information(field.values, field.origin, field.spacing, pose, angles[use], ranges[use], params.hit)
     if told[2, 2] < 1e-6:
         return math.inf
@@ -242,6 +248,12 @@ def _reweighed(weights: np.ndarray, told: np.ndarray) -> np.ndarray:
         power *= 0.7
         new = weights * np.exp(power * told)
     return new / new.sum()
+
+
+def _spread_echoes(ranges: np.ndarray, beams: int) -> np.ndarray:
+    """Return the indices of at most `beams` of the beams that have an echo, evenly spread: few may be all that is seen."""
+    echoes = np.flatnonzero(np.isfinite(ranges))
+    return echoes[spread_beams(len(echoes), beams)] if len(echoes) else echoes
 
 
 def _jittered(poses: np.ndarray, scores: np.ndarray, count: int, random: np.random.Generator) -> np.ndarray:

@@ -20,6 +20,7 @@ from quarterdeck.physics.amcl import (
     resample,
     weakest,
     weigh_fix,
+    weigh_heading,
     weigh_scan,
     wrap,
 )
@@ -35,6 +36,7 @@ from quarterdeck.physics.positioning import (
     correct,
     draw_faults,
     fixes,
+    lasting_deviation,
     measure_motion,
     predict,
     step_slow,
@@ -176,34 +178,35 @@ class Navigation:
         fix: bool,
         hears: bool,
     ) -> Belief:
-        """Return what robot `i` believes after a scan and, where that does not hold it, a position fix.
+        """Return what robot `i` believes after a scan and, where that does not hold it, a position and a heading fix.
 
-        It lives by its lidar as long as the belief stays sharp, whatever a single scan tells; when it has not for BRIDGE
-        seconds, by GNSS, until a scan alone tells enough: then it looks for where it fits around where it should be.
+        It lives by its lidar as long as the belief stays sharp, whatever a single scan tells. When it has not for BRIDGE
+        seconds, GNSS and compass bound what odometry and what little is seen leave open, until the belief is sharp and
+        a scan alone would keep it so.
         """
         assert self.map is not None
         p, site, doubt = self.params, self.map, max(6 * math.hypot(self.receiver.white, self.receiver.slow), 2.0)
-        holds = self.mode[i] == LIDAR
-        if not holds and weakest(self.believed[i], site.field, angles, ranges, p) <= p.weak:
-            holds, self.weak[n] = True, 0.0
-            belief = Belief(belief.particles, belief.weights)
-            wide = max(doubt, 3 * _spread(belief))
-            around = (place if hears else self.believed[i, :2], wide)
-            belief = recover(belief, 0.9, site.field, site.grid, angles, ranges, REACH, p, self.random, around)
-        if holds:
-            belief = weigh_scan(belief, site.field, angles, ranges, p)
-            astray = hears and math.hypot(*(self.believed[i, :2] - place)) > doubt
-            part = 0.9 if astray else lostness(belief)
-            self.rest[n] = max(self.rest[n] - PERIOD, 0.0)
-            if part > ALARM and self.rest[n] == 0:
-                self.recoveries[i] += 1
-                self.rest[n] = REST
-                near = (place, doubt) if hears else None
-                belief = recover(belief, part, site.field, site.grid, angles, ranges, REACH, p, self.random, near)
-            self.weak[n] = self.weak[n] + PERIOD if _spread(belief) > p.weak else 0.0
-            holds = self.weak[n] <= BRIDGE
-        elif hears and fix:
-            belief = weigh_fix(belief, place, math.hypot(self.receiver.white, self.receiver.slow))
+        belief = weigh_scan(belief, site.field, angles, ranges, p)
+        astray = hears and math.hypot(*(self.believed[i, :2] - place)) > doubt
+        part = 0.9 if astray else lostness(belief)
+        self.rest[n] = max(self.rest[n] - PERIOD, 0.0)
+        if part > ALARM and self.rest[n] == 0:
+            self.recoveries[i] += 1
+            self.rest[n] = REST
+            near = (place, doubt) if hears else None
+            belief = recover(belief, part, site.field, site.grid, angles, ranges, REACH, p, self.random, near)
+        spread = _spread(belief)
+        if spread > p.weak or (self.mode[i] != LIDAR and weakest(self.believed[i], site.field, angles, ranges, p) > p.weak):
+            self.weak[n] += PERIOD
+        else:
+            self.weak[n] = 0.0
+        holds = self.weak[n] <= BRIDGE
+        if not holds and fix:
+            if hears:  # far off or wide, it takes over a fix; finer, it learns only what fixes tell in the long run
+                coarse = astray or spread > 2 * self.receiver.slow
+                once = math.hypot(self.receiver.white, self.receiver.slow)
+                belief = weigh_fix(belief, place, once if coarse else lasting_deviation(self.receiver))
+            belief = weigh_heading(belief, self.truth[i, 2] + COMPASS * self.random.standard_normal(), COMPASS)
         self.mode[i] = LIDAR if holds else BY_GNSS if hears else DEAD
         return belief
 

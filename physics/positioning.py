@@ -107,6 +107,15 @@ def fixes(position: np.ndarray, slow: np.ndarray, model: GnssModel, random: np.r
     return position[:, :2] + slow + model.white * random.standard_normal((len(position), 2))
 
 
+def lasting_deviation(model: GnssModel) -> float:
+    """Return metres: the normal deviation at which fixes, each taken as independent, tell as much as they really do.
+
+    The slow part does not average out: it tells anew only every two memories (the information rate of a first-order
+    Gauss-Markov process seen for long).
+    """
+    return math.hypot(model.white, model.slow * math.sqrt(2 * model.memory / model.interval))
+
+
 def predict(
     pose: np.ndarray, covariance: np.ndarray, motion: np.ndarray, seconds: float, model: OdometryModel
 ) -> tuple[np.ndarray, np.ndarray]:

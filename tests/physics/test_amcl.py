@@ -22,6 +22,7 @@ from quarterdeck.physics.amcl import (
     resample,
     weakest,
     weigh_fix,
+    weigh_heading,
     weigh_scan,
 )
 from quarterdeck.physics.lidar import beam_angles, cast, edge_grid
@@ -72,6 +73,15 @@ def test_a_fix_is_a_kalman_update() -> None:
         mean = after.weights @ values
         assert mean == pytest.approx(prior + gain * (told - prior), abs=0.02)
         assert after.weights @ (values - mean) ** 2 == pytest.approx((1 - gain) * deviation**2, rel=0.05)
+
+
+def test_a_heading_fix_is_a_kalman_update_across_the_half_turn() -> None:
+    """A compass that tells of -179 degrees pulls a belief of 179 over the half turn, as far as the closed form says."""
+    params = replace(FilterParams(), least=50_000, most=50_000)
+    here, deviation = np.array([0.0, 0.0, math.radians(179)]), (0.1, 0.1, math.radians(1))
+    belief = believe_at(here, deviation, params, np.random.default_rng(5))
+    after = weigh_heading(belief, math.radians(-179), math.radians(2))
+    assert math.degrees(estimate(after).pose[2]) % 360 == pytest.approx(179 + 2 * 1 / (1 + 4), abs=0.05)
 
 
 def test_a_fix_far_from_all_particles_takes_them_along() -> None:

@@ -15,6 +15,7 @@ from quarterdeck.physics.positioning import (
     correct,
     draw_faults,
     fixes,
+    lasting_deviation,
     measure_motion,
     motion_deviation,
     predict,
@@ -97,3 +98,13 @@ def test_without_fixes_the_doubt_grows_and_only_those_who_measure_gain() -> None
     assert np.abs(after[7, :2] - truth[7, :2]).max() < np.abs(believed[7, :2] - truth[7, :2]).max()
     np.testing.assert_array_equal(after[~seen], believed[~seen])
     assert np.trace(surer[7]) < np.trace(covariance[7])
+
+
+def test_an_hour_of_fixes_tells_what_the_lasting_deviation_says() -> None:
+    """The mean of many fixes is as wrong as that of as many independent ones with the lasting deviation."""
+    model, rng, count = GNSS["single"], np.random.default_rng(3), 6000
+    slow, total = model.slow * rng.standard_normal((500, 2)), np.zeros((500, 2))
+    for _ in range(count):
+        slow = step_slow(slow, model.interval, model, rng)
+        total += fixes(np.zeros((500, 2)), slow, model, rng)
+    assert (total / count).std() == pytest.approx(lasting_deviation(model) / np.sqrt(count), rel=0.1)

@@ -5,7 +5,7 @@ import math
 
 import jsonschema
 import pytest
-from shapely import box
+from shapely import affinity, box
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Obstacle
@@ -56,6 +56,19 @@ def test_where_there_is_nothing_to_see_gnss_takes_over(mow) -> None:
     assert place.p95 < 0.3
     deaf = simulate(mission, sensing=Sensing(gnss="rtk", amcl=True), faults=["gnss:husky-1@0"], duration=60.0)
     assert deaf.report.vehicles[0].localisation.dead > 0.8
+
+
+def test_a_robot_that_comes_back_to_what_it_knows_lives_by_its_lidar_again(mow) -> None:
+    """Between two groups of boxes 115 m apart it sees nothing, and is bounded by a poor receiver without taking over its
+    errors; at the next boxes the lidar has it again.
+    """
+    boxes = [*yard(), *(Obstacle(f"far-{o.id}", affinity.translate(o.polygon, 155.0)) for o in yard())]
+    mission = mow("husky", spacing=5.0, length=200.0, obstacles=boxes)
+    run = simulate(mission, sensing=Sensing(amcl=True), seed=1, sample=1.0)
+    place = run.report.vehicles[0].localisation
+    assert 0.02 < place.gnss < 0.6
+    assert place.p95 < 0.6
+    assert run.report.passed, run.report.reasons
 
 
 def test_gnss_errors_show_in_the_track_and_not_only_in_the_belief(mow) -> None:
