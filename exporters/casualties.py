@@ -6,7 +6,6 @@ first step gives an order, not a diagnosis), `category` what the medic confirmed
 
 import csv
 import io
-import json
 from collections.abc import Iterable
 from datetime import UTC, datetime, timedelta
 from typing import Any
@@ -15,10 +14,11 @@ import numpy as np
 from lxml import etree
 
 from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.features import collection, feature, point_feature
+from quarterdeck.geo.palette import CASUALTY
 from quarterdeck.mission.triage.figures import figures
 from quarterdeck.mission.triage.outcome import Fate, Outcome
 
-MARK = {"red": "#d62728", "yellow": "#f2c200", "green": "#2ca02c", "grey": "#7f7f7f", "black": "#000000"}
 MEANING = {"red": "immediate", "yellow": "delayed", "green": "minimal", "grey": "expectant", "black": "dead"}
 _TIMES = ("found", "reported", "delivered", "reached", "treated")
 _BY = ("found_by", "reported_by", "delivered_by", "treated_by")
@@ -34,18 +34,14 @@ def casualties_geojson(outcome: Outcome) -> str:
     The first feature has no geometry and the mission's figures. Times are seconds from the mission's start.
     """
     plain = {k: None if not np.isfinite(v) else round(v, 3) for k, v in figures(outcome).items()}
-    head = _feature(None, role="triage", method=outcome.method, seed=outcome.seed, figures=plain, reasons=outcome.reasons)
+    head = feature("triage", None, method=outcome.method, seed=outcome.seed, figures=plain, reasons=outcome.reasons)
     features = [head]
     for fate in outcome.fates:
         if fate.found is None:
             continue
-        lonlat = np.round(outcome.scenario.frame.to_degrees(np.array(known_position(outcome, fate))), 9)[0].tolist()
-        features.append(
-            _feature({"type": "Point", "coordinates": lonlat}, fate.id, role="casualty", **_properties(outcome, fate))
-        )
-    lines = ",\n".join(json.dumps(f, allow_nan=False, ensure_ascii=False) for f in features)
-    name = json.dumps(outcome.scenario.name, ensure_ascii=False)
-    return f'{{"type": "FeatureCollection", "name": {name}, "features": [\n{lines}\n]}}\n'
+        place = known_position(outcome, fate)
+        features.append(point_feature(outcome.scenario.frame, "casualty", place, fate.id, **_properties(outcome, fate)))
+    return collection(outcome.scenario.name, features)
 
 
 def casualties_csv(outcome: Outcome) -> str:
@@ -128,7 +124,7 @@ def _properties(outcome: Outcome, fate: Fate) -> dict[str, Any]:
         "uncertainty": _sigma(outcome, fate),
         **seconds,
         **{n: getattr(fate, n) for n in _BY},
-        "marker-color": MARK[colour],
+        "marker-color": CASUALTY[colour],
     }
 
 
@@ -136,11 +132,6 @@ def _words(fate: Fate) -> str:
     if fate.category:
         return f"treated by {fate.treated_by}"
     return f"sorted by {fate.found_by}, not yet seen by a medic" if fate.sort else f"found by {fate.found_by}"
-
-
-def _feature(geometry: dict[str, Any] | None, identity: str | None = None, **properties: Any) -> dict[str, Any]:
-    head = {"type": "Feature"} | ({"id": identity} if identity is not None else {})
-    return head | {"properties": properties, "geometry": geometry}
 
 
 def _csv(columns: list[str], rows: Iterable[dict[str, Any]]) -> str:

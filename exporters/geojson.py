@@ -14,10 +14,10 @@ import shapely
 from shapely.geometry import mapping
 from shapely.geometry.base import BaseGeometry
 
-from quarterdeck.exporters.colours import colours
 from quarterdeck.exporters.export import Settings
 from quarterdeck.exporters.places import file_stems
 from quarterdeck.geo.frame import Frame
+from quarterdeck.geo.palette import FILL, SITE, TASK, colours
 from quarterdeck.mission.mission import Mission, Route
 
 SURVEY_WIDTH, TRANSIT_WIDTH = 3, 1.5
@@ -33,14 +33,14 @@ def files(mission: Mission, settings: Settings) -> dict[str, str]:  # noqa: ARG0
 def site_features(mission: Mission) -> Iterator[dict[str, Any]]:
     """Yield the operating area, the areas, the obstacles and the tasks."""
     site, frame = mission.site, mission.frame
-    yield _feature(frame, site.operating, name="operating area", stroke="#555555", **_filled(0.0))
+    yield _feature(frame, site.operating, name="operating area", **_look("operating"))
     for area in site.areas:
-        yield _feature(frame, area.polygon, name=area.id, stroke="#444444", fill="#9ecae1", **_filled(0.15))
+        yield _feature(frame, area.polygon, name=area.id, **_look("area"))
     for obstacle in site.obstacles:
-        yield _feature(frame, obstacle.polygon, name=obstacle.id, stroke="#7f0000", fill="#7f0000", **_filled(0.4))
+        yield _feature(frame, obstacle.polygon, name=obstacle.id, **_look("obstacle"))
     for task in mission.tasks:
         point = shapely.Point(task.position)
-        yield _feature(frame, point, name=task.id, **{"marker-color": "#666666", "marker-size": "small"})
+        yield _feature(frame, point, name=task.id, **{"marker-color": TASK, "marker-size": "small"})
 
 
 def route_features(mission: Mission) -> Iterator[dict[str, Any]]:
@@ -53,8 +53,8 @@ def route_features(mission: Mission) -> Iterator[dict[str, Any]]:
         yield _feature(frame, shapely.Point(route.xyz[0, :2]), name=route.vehicle, **figures)
 
 
-def _filled(opacity: float) -> dict[str, float]:
-    return {"fill-opacity": opacity, "stroke-width": 1}
+def _look(role: str) -> dict[str, Any]:
+    return {"stroke": SITE[role], "fill": SITE[role], "fill-opacity": FILL[role], "stroke-width": 1}
 
 
 def _legs(frame: Frame, route: Route, colour: str) -> Iterator[dict[str, Any]]:

@@ -8,9 +8,9 @@ import numpy as np
 import shapely
 import simplekml
 
-from quarterdeck.exporters.colours import colours
 from quarterdeck.exporters.export import Settings
 from quarterdeck.exporters.places import degrees, file_stems, printable
+from quarterdeck.geo.palette import FILL, SITE, colours
 from quarterdeck.mission.mission import Mission, Route
 
 
@@ -25,10 +25,10 @@ def _document(mission: Mission) -> str:
     simplekml.Kml.resetidcounter()  # ids count on through a process: the same mission must give the same bytes
     kml = simplekml.Kml(name=printable(mission.name))
     site = kml.newfolder(name="site")
-    for name, polygon, colour, fill in (
-        *((f"area {a.id}", a.polygon, "#2b8cbe", 40) for a in mission.site.areas),
-        ("operating area", mission.site.operating, "#555555", 0),
-        *((f"obstacle {o.id}", o.polygon, "#a63603", 120) for o in mission.site.obstacles),
+    for name, polygon, role in (
+        *((f"area {a.id}", a.polygon, "area") for a in mission.site.areas),
+        ("operating area", mission.site.operating, "operating"),
+        *((f"obstacle {o.id}", o.polygon, "obstacle") for o in mission.site.obstacles),
     ):
         for part in getattr(polygon, "geoms", [polygon]):
             made = site.newpolygon(
@@ -36,8 +36,8 @@ def _document(mission: Mission) -> str:
                 outerboundaryis=_ring(mission, part.exterior),
                 innerboundaryis=[_ring(mission, ring) for ring in part.interiors],
             )
-            made.style.linestyle.color = _abgr(colour, 255)
-            made.style.polystyle.color = _abgr(colour, fill)
+            made.style.linestyle.color = _abgr(SITE[role], 255)
+            made.style.polystyle.color = _abgr(SITE[role], round(255 * FILL[role]))
     for route, colour in zip(mission.routes, colours(len(mission.routes)), strict=True):
         _route(kml.newfolder(name=printable(route.vehicle)), mission, route, colour)
     return str(kml.kml())

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from quarterdeck.geo.palette import SITE
 from quarterdeck.mission.mission import Mission, Route
 from quarterdeck.physics.report import Report
 
@@ -94,11 +95,11 @@ def legend(panel: Axes, mission: Mission, *, run: bool = False) -> None:
         Line2D([], [], color="#333333", linewidth=1.8, label="survey"),
         Line2D([], [], color="#333333", linewidth=0.9, alpha=0.75, label="transit, turn"),
         Line2D([], [], **START, markersize=4, label="start"),
-        Patch(facecolor=AREA, edgecolor="#5b7f99", label="area"),
-        Patch(facecolor=WATER, edgecolor="#555555", linestyle="--", label="operating area"),
+        Patch(facecolor=AREA, edgecolor=SITE["area"], label="area"),
+        Patch(facecolor=WATER, edgecolor=SITE["operating"], linestyle="--", label="operating area"),
     ]
     if mission.site.obstacles:
-        handles.append(Patch(facecolor=OBSTACLE, edgecolor="#444444", label="obstacle"))
+        handles.append(Patch(facecolor=OBSTACLE, edgecolor=SITE["obstacle"], label="obstacle"))
     if mission.tasks:
         handles.append(Line2D([], [], **TASK, label="task"))
     if run:

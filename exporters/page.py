@@ -8,9 +8,9 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from quarterdeck.exporters.colours import colours
 from quarterdeck.exporters.export import Settings
 from quarterdeck.exporters.places import file_stems
+from quarterdeck.geo.palette import colours
 from quarterdeck.mission.mission import Mission, Route
 
 

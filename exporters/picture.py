@@ -9,11 +9,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from quarterdeck.exporters.colours import colours
 from quarterdeck.exporters.export import Settings
 from quarterdeck.exporters.map_furniture import fill, graticule, north_arrow, scale_bar
 from quarterdeck.exporters.map_panel import AREA, CONTACT, MISSED, OBSTACLE, START, TASK, WATER, legend, table
 from quarterdeck.exporters.places import file_stems
+from quarterdeck.geo.palette import CASUALTY, SITE, colours
 from quarterdeck.mission.mission import Mission
 from quarterdeck.physics.report import Report
 from quarterdeck.physics.swath import driven_tracks, planned_tracks
@@ -79,16 +79,18 @@ def _view(chart: Axes, mission: Mission, aspect: float) -> None:
 
 def _site(chart: Axes, mission: Mission) -> None:
     site = mission.site
-    fill(chart, site.operating, facecolor=WATER, edgecolor="#555555", linewidth=0.8, linestyle=(0, (5, 3)), zorder=1)
+    fill(
+        chart, site.operating, facecolor=WATER, edgecolor=SITE["operating"], linewidth=0.8, linestyle=(0, (5, 3)), zorder=1
+    )
     for area in site.areas:
-        fill(chart, area.polygon, facecolor=AREA, edgecolor="#5b7f99", linewidth=0.7, zorder=2)
+        fill(chart, area.polygon, facecolor=AREA, edgecolor=SITE["area"], linewidth=0.7, zorder=2)
     for obstacle in site.obstacles:
         solid = bool(obstacle.blocks)
         fill(
             chart,
             obstacle.polygon,
             facecolor=OBSTACLE if solid else "none",
-            edgecolor="#444444",
+            edgecolor=SITE["obstacle"],
             linewidth=0.6,
             hatch=None if solid else "////",
             zorder=3,
@@ -174,8 +176,9 @@ def _places(chart: Axes, mission: Mission) -> None:
                 task.id, task.position, xytext=(4, -7), textcoords="offset points", fontsize=5.5, zorder=7, parse_math=False
             )
     for casualty in mission.casualties:
-        colour = {"grey": "#999999"}.get(casualty.colour, casualty.colour)
-        chart.plot(*casualty.position, "P", color=colour, markeredgecolor="black", markersize=6, zorder=7)
+        chart.plot(
+            *casualty.position, "P", color=CASUALTY[casualty.colour], markeredgecolor="black", markersize=6, zorder=7
+        )
 
 
 def _numbers(numbers: list[int]) -> str:

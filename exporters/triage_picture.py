@@ -10,7 +10,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from shapely import get_parts, get_rings
 
-from quarterdeck.exporters.casualties import MARK, MEANING
+from quarterdeck.exporters.casualties import MEANING
+from quarterdeck.geo.palette import CASUALTY
 from quarterdeck.mission.triage.figures import counts_over_time
 from quarterdeck.mission.triage.outcome import Outcome, track_at
 from quarterdeck.mission.triage.settings import COLOURS, SORT
@@ -77,7 +78,7 @@ def draw_field(
             ax.plot(*path.T, color=colour, lw=wide, ls=":" if kind == "uav" else "-", alpha=0.8 if kind != "uav" else 0.6)
         ax.plot(*here, marker=marker, color=colour, ms=7, mec="black", mew=0.6, zorder=5)
     for fate in outcome.fates:
-        colour = MARK[fate.colour]
+        colour = CASUALTY[fate.colour]
         seen = fate.found is not None and fate.found <= until
         ax.plot(
             fate.x,
@@ -112,10 +113,10 @@ def field_legend(outcome: Outcome) -> list[Line2D]:
 def _draw_counts(ax: Axes, outcome: Outcome) -> None:
     times = np.linspace(0.0, outcome.end, 1000)
     for colour, counts in counts_over_time(outcome.fates, times).items():
-        ax.step(times, counts["found"], where="post", color=MARK[colour], lw=1.2, ls="--")
-        ax.step(times, counts["treated"], where="post", color=MARK[colour], lw=2.2)
+        ax.step(times, counts["found"], where="post", color=CASUALTY[colour], lw=1.2, ls="--")
+        ax.step(times, counts["treated"], where="post", color=CASUALTY[colour], lw=2.2)
     present = [c for c in COLOURS if any(f.colour == c for f in outcome.fates)]
-    handles = [Line2D([], [], color=MARK[c], lw=2.2, label=f"{c} ({MEANING[c]})") for c in present]
+    handles = [Line2D([], [], color=CASUALTY[c], lw=2.2, label=f"{c} ({MEANING[c]})") for c in present]
     handles += [Line2D([], [], color="black", lw=1.2, ls="--", label="found")]
     handles += [Line2D([], [], color="black", lw=2.2, label="treated")]
     ax.legend(handles=handles, fontsize=8, ncols=2, loc="upper left")
@@ -143,16 +144,16 @@ def _draw_bars(ax: Axes, outcome: Outcome) -> None:
                 if stop is None:
                     break
         if fate.reached is not None and fate.treated is not None:
-            ax.barh(row, fate.treated - fate.reached, left=fate.reached, color=MARK[fate.colour], height=0.62)
+            ax.barh(row, fate.treated - fate.reached, left=fate.reached, color=CASUALTY[fate.colour], height=0.62)
         elif fate.state != "treated":
             ax.text(outcome.end, row, f" {fate.state}", va="center", fontsize=7)
     ax.set_yticks(range(len(order)), [f.id for f in order], fontsize=7)
     for label, fate in zip(ax.get_yticklabels(), order, strict=True):
-        label.set_color(MARK[fate.colour])
+        label.set_color(CASUALTY[fate.colour])
     ax.set_ylim(len(order) - 0.4, -0.6)
     ax.set_xlim(0.0, max(outcome.end, 1.0))
     ax.set_xlabel("seconds from the mission's start")
-    stages = (*((c, t) for _, _, c, t in _STAGES), ("#d62728", "in treatment"))
+    stages = (*((c, t) for _, _, c, t in _STAGES), (CASUALTY["red"], "in treatment"))
     handles = [Line2D([], [], color=c, lw=6, label=t) for c, t in stages]
     ax.figure.legend(handles=handles, fontsize=8, loc="outside lower right", ncols=3)
     ax.grid(axis="x", alpha=0.3)

@@ -4,7 +4,6 @@ Its first feature has no geometry and `role: plan`: the header. Then the site, t
 with its waypoints' figures as lists, and the layers for the eye. The same mission gives the same bytes.
 """
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, fields
@@ -12,20 +11,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from shapely import MultiPolygon, Polygon, get_coordinates, orient_polygons, set_coordinates
+from shapely import get_coordinates, set_coordinates
 from shapely.errors import ShapelyError
-from shapely.geometry import mapping, shape
+from shapely.geometry import shape as from_geojson
 
 from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.features import collection, degrees, feature, geometry, point_feature, polygon_feature, position
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.geojson import parse
 from quarterdeck.geo.models import VehicleModel
+from quarterdeck.geo.palette import CASUALTY, colours
 from quarterdeck.geo.reader import read_bytes
 from quarterdeck.geo.scenario import Area, Casualty, Obstacle, Precedence, Sensor, Site, Task, Vehicle, as_multipolygon
 from quarterdeck.mission.mission import Layer, Mission, Route, Waypoint
 
 FORMAT = 1
-COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#ff7f0e", "#9467bd", "#8c564b", "#e377c2", "#17becf", "#bcbd22", "#7f7f7f")
 DAMAGE = (KeyError, TypeError, ValueError, ArithmeticError, IndexError, AttributeError, ShapelyError)
 LISTS = ("leg", "speed", "hold", "time", "task")  # of a route's waypoints, in the order of its positions
 
@@ -33,18 +33,11 @@ LISTS = ("leg", "speed", "hold", "time", "task")  # of a route's waypoints, in t
 def plan_text(mission: Mission) -> str:
     """Return the PLAN file's text, one feature a line."""
     features = [_header(mission), *_site(mission), *_fleet(mission), *_layers(mission), *_routes(mission)]
-    lines = ",\n".join(json.dumps(f, allow_nan=False, ensure_ascii=False, separators=(", ", ": ")) for f in features)
-    name = json.dumps(mission.name, ensure_ascii=False)
-    return f'{{"type": "FeatureCollection", "name": {name}, "features": [\n{lines}\n]}}\n'
-
-
-def _feature(role: str, geometry: Any, identity: str | None = None, **properties: Any) -> dict[str, Any]:
-    head = {"type": "Feature"} | ({"id": identity} if identity is not None else {})
-    return head | {"properties": {"role": role} | properties, "geometry": geometry}
+    return collection(mission.name, features)
 
 
 def _header(mission: Mission) -> dict[str, Any]:
-    return _feature(
+    return feature(
         "plan",
         None,
         format=FORMAT,
@@ -75,56 +68,32 @@ def _plain(value: Any, digits: int = 12) -> Any:
     return value
 
 
-def _geometry(frame: Frame, geometry: Any) -> dict[str, Any]:
-    """Return a shapely geometry in metres as GeoJSON in degrees, 9 decimals, rings wound as RFC 7946 says."""
-    if isinstance(geometry, Polygon | MultiPolygon):
-        geometry = orient_polygons(geometry)
-        if isinstance(geometry, MultiPolygon) and len(geometry.geoms) == 1:
-            geometry = geometry.geoms[0]
-    return dict(mapping(set_coordinates(geometry, _degrees(frame, get_coordinates(geometry)))))
-
-
-def _degrees(frame: Frame, xy: Any) -> np.ndarray:
-    return np.round(frame.to_degrees(np.asarray(xy, dtype=float)), 9)
-
-
-def _point(frame: Frame, xy: tuple[float, float]) -> list[float]:
-    return _degrees(frame, [xy])[0].tolist()
-
-
 def _site(mission: Mission) -> list[dict[str, Any]]:
-    style = {"operating": ("#555555", 0.0), "area": ("#2b8cbe", 0.08), "obstacle": ("#a63603", 0.5)}
-
-    def feature(role: str, polygon: Any, identity: str | None = None, **properties: Any) -> dict[str, Any]:
-        colour, opacity = style[role]
-        look = {"stroke": colour, "stroke-width": 1, "fill": colour, "fill-opacity": opacity}
-        return _feature(role, _geometry(mission.frame, polygon), identity, **properties, **look)
-
-    site = mission.site
+    frame, site = mission.frame, mission.site
     return [
-        feature("operating", site.operating),
-        *(feature("area", a.polygon, a.id, priority=a.priority) for a in site.areas),
-        *(feature("obstacle", o.polygon, o.id, blocks=sorted(o.blocks), height=o.height) for o in site.obstacles),
+        polygon_feature(frame, "operating", site.operating),
+        *(polygon_feature(frame, "area", a.polygon, a.id, priority=a.priority) for a in site.areas),
+        *(
+            polygon_feature(frame, "obstacle", o.polygon, o.id, blocks=sorted(o.blocks), height=o.height)
+            for o in site.obstacles
+        ),
     ]
 
 
 def _fleet(mission: Mission) -> list[dict[str, Any]]:
     frame = mission.frame
     features = []
-    for i, v in enumerate(mission.vehicles):
+    for v, colour in zip(mission.vehicles, colours(len(mission.vehicles)), strict=True):
         given: dict[str, Any] = {"model": _plain(asdict(v.model))} | {n: getattr(v, n) for n in VEHICLE_FIGURES}
         given |= {"sensor": asdict(v.sensor) if v.sensor else None, "can": sorted(v.can), "returns": v.returns}
-        given |= {"end": _point(frame, v.end) if v.end else None, "marker-color": COLOURS[i % len(COLOURS)]}
-        features.append(
-            _feature("vehicle", {"type": "Point", "coordinates": _point(frame, v.start)}, v.id, **_plain(given))
-        )
+        given |= {"end": position(frame, v.end) if v.end else None, "marker-color": colour}
+        features.append(point_feature(frame, "vehicle", v.start, v.id, **_plain(given)))
     for t in mission.tasks:
         given = {k: v for k, v in asdict(t).items() if k not in ("id", "position")} | {"needs": sorted(t.needs)}
-        place = {"type": "Point", "coordinates": _point(frame, t.position)}
-        features.append(_feature("task", place, t.id, **_plain(given)))
+        features.append(point_feature(frame, "task", t.position, t.id, **_plain(given)))
     for c in mission.casualties:
-        place = {"type": "Point", "coordinates": _point(frame, c.position)}
-        features.append(_feature("casualty", place, c.id, colour=c.colour))
+        look = {"colour": c.colour, "marker-color": CASUALTY[c.colour]}
+        features.append(point_feature(frame, "casualty", c.position, c.id, **look))
     return features
 
 
@@ -133,17 +102,17 @@ VEHICLE_FIGURES = ("share", "speed", "turn_radius", "clearance", "endurance", "b
 
 def _layers(mission: Mission) -> list[dict[str, Any]]:
     return [
-        _feature("layer", _geometry(mission.frame, geometry), layer=layer.name, **_plain(properties))
+        feature("layer", geometry(mission.frame, shape), layer=layer.name, **_plain(properties))
         for layer in mission.layers
-        for geometry, properties in zip(layer.geometries, layer.properties, strict=True)
+        for shape, properties in zip(layer.geometries, layer.properties, strict=True)
     ]
 
 
 def _routes(mission: Mission) -> list[dict[str, Any]]:
     features = []
-    for i, route in enumerate(mission.routes):
+    for route, colour in zip(mission.routes, colours(len(mission.routes)), strict=True):
         xyz = route.xyz
-        lonlat = _degrees(mission.frame, xyz[:, :2])
+        lonlat = degrees(mission.frame, xyz[:, :2])
         with_z = bool(np.any(xyz[:, 2] != 0))
         line = np.column_stack([lonlat, np.round(xyz[:, 2], 3)]).tolist() if with_z else lonlat.tolist()
         lists = {name: [getattr(w, name) for w in route.waypoints] for name in LISTS}
@@ -152,9 +121,9 @@ def _routes(mission: Mission) -> list[dict[str, Any]]:
         if not any(lists["task"]):
             del lists["task"]
         figures = {"energy": route.energy, "length": round(route.length, 2), "duration": round(route.duration, 2)}
-        look: dict[str, Any] = {"stroke": COLOURS[i % len(COLOURS)], "stroke-width": 2}
-        geometry = {"type": "LineString", "coordinates": line if len(line) > 1 else line * 2}
-        features.append(_feature("route", geometry, vehicle=route.vehicle, **look, **_plain(figures), **_plain(lists)))
+        look: dict[str, Any] = {"stroke": colour, "stroke-width": 2}
+        drawn = {"type": "LineString", "coordinates": line if len(line) > 1 else line * 2}
+        features.append(feature("route", drawn, vehicle=route.vehicle, **look, **_plain(figures), **_plain(lists)))
     return features
 
 
@@ -190,8 +159,8 @@ def _mission(name: str, header: dict[str, Any], features: list[dict[str, Any]]) 
         return [f for f in features if f["properties"]["role"] == role]
 
     def metres(f: dict[str, Any]) -> Any:
-        geometry = shape(f["geometry"])
-        return set_coordinates(geometry, frame.to_metres(get_coordinates(geometry)))
+        place = from_geojson(f["geometry"])
+        return set_coordinates(place, frame.to_metres(get_coordinates(place)))
 
     site = Site(
         areas=tuple(Area(f["id"], as_multipolygon(metres(f)), f["properties"]["priority"]) for f in of("area")),

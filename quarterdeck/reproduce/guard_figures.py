@@ -14,9 +14,10 @@ from quarterdeck.coverage.cst import constrained_tour
 from quarterdeck.coverage.forest import ABSENT, Forest
 from quarterdeck.coverage.guards.pieces import trapezoids
 from quarterdeck.coverage.recovery import recover
+from quarterdeck.geo.palette import colours
 from quarterdeck.reproduce.guard_maps import paper_network, scenario_on
 
-COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#ff7f0e", "#9467bd", "#8c564b", "#e377c2", "#17becf", "#bcbd22", "#7f7f7f")
+COLOURS = colours(10)
 
 
 def figures(room: MultiPolygon, reach: float, robots: int) -> bytes:

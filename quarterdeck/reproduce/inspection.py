@@ -216,7 +216,7 @@ def _draw(folder: Path, seed: int, *, force: bool) -> None:
     from matplotlib.figure import Figure
 
     from quarterdeck.geo.files import write_file
-    from quarterdeck.mission.planfile import COLOURS
+    from quarterdeck.geo.palette import colours
 
     for name, case in CASES.items():
         figure = Figure(figsize=(13, 6.2), layout="tight")
@@ -227,7 +227,7 @@ def _draw(folder: Path, seed: int, *, force: bool) -> None:
                 ax.plot(*polygon.exterior.xy, color="0.4", lw=1)
             for obstacle in mission.site.obstacles:
                 ax.fill(*obstacle.polygon.exterior.xy, color="0.75", ec="0.5")
-            for route, colour in zip(mission.routes, COLOURS, strict=False):
+            for route, colour in zip(mission.routes, colours(len(mission.routes)), strict=True):
                 x, y = route.xyz[:, 0], route.xyz[:, 1]
                 order = "-".join(w.task for w in route.waypoints if w.task) or "stays"
                 ax.plot(x, y, color=colour, lw=2, label=f"{route.vehicle}: {order}, home at {route.duration:.0f} s")
