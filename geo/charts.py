@@ -64,7 +64,7 @@ def read_cell(path: str | Path) -> Cell:
             head = _columns(pyogrio, path, "DSID", ("DSPM_CSCL", "DSID_EDTN", "DSID_UPDN"))[1]
             objects = {name: _objects(pyogrio, path, name) for name in names if name != "DSID" and name.isupper()}
     except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError) as error:
-        raise InputError(f"{path}: cannot be read as an S-57 cell ({str(error).splitlines()[0]})") from None
+        raise InputError(f"{path}: cannot be read as an S-57 cell ({str(error).splitlines()[0][:120]})") from None
     scale = float(head["DSPM_CSCL"][0])
     return Cell(Path(path).name, scale if scale > 0 else float("inf"), head["DSID_EDTN"][0], head["DSID_UPDN"][0], objects)
 
@@ -93,7 +93,7 @@ def _columns(pyogrio: Any, path: str | Path, layer: str, wanted: tuple[str, ...]
 def _objects(pyogrio: Any, path: str | Path, layer: str) -> tuple[tuple[BaseGeometry, float], ...]:
     wanted = {"SOUNDG": "DEPTH", "M_COVR": "CATCOV"}.get(layer, "DRVAL1" if layer in DEPTHS else "VALSOU")
     geometries, columns = _columns(pyogrio, path, layer, (wanted,))
-    shapes = shapely.from_wkb(geometries) if geometries is not None else []
+    shapes = shapely.from_wkb(geometries, on_invalid="ignore") if geometries is not None else []  # None: damaged
     values = np.asarray(columns.get(wanted, np.full(len(shapes), np.nan)), dtype=float)
     return tuple((g, float(v)) for g, v in zip(shapes, values, strict=True) if g is not None and not g.is_empty)
 

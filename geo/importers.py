@@ -8,6 +8,7 @@ import io
 import json
 import re
 import zipfile
+import zlib
 from typing import Any
 
 import numpy as np
@@ -87,7 +88,7 @@ def _unpacked(data: bytes) -> Any:
             if entries[0].file_size > MOST_BYTES:
                 raise InputError(f"unpacks to more than {MOST_BYTES // 1_000_000} MB; give a smaller KMZ")
             return _xml(archive.read(entries[0]))
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError) as error:
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError) as error:
         raise InputError(f"is a damaged KMZ ({error})") from None
 
 

@@ -46,6 +46,17 @@ class VehicleModel:
     dynamics: Mapping[str, Any] = field(default_factory=dict, hash=False)
     file: str = ""
 
+    def __post_init__(self) -> None:
+        """Raise InputError for figures that no vehicle has."""
+        for key in (*_LIMITS, *_ENERGY, "climb_rate", "altitude"):
+            value = getattr(self, key)
+            if not 0 <= value < 1e9 or (value == 0 and key not in _MAY_BE_ZERO):
+                raise InputError(f"{key} = {value:g} must be positive and below 1e9")
+        if self.speed > self.max_speed:
+            raise InputError(f"speed {self.speed:g} exceeds max_speed {self.max_speed:g}")
+        if self.domain == "aerial" and not self.climb_rate:
+            raise InputError("climb_rate of an aerial vehicle must be a number above 0, m/s")
+
     def power(self, speed: float) -> float:
         """Return watts drawn at `speed` m/s: idle plus a power law through the cruise figure."""
         return self.power_idle + (self.power_cruise - self.power_idle) * (speed / self.speed) ** self.power_exponent
@@ -104,10 +115,6 @@ def _model(document: dict[str, Any], file: str) -> VehicleModel:
     figures = {key: _number(limits, "limits", key) for key in _LIMITS}
     figures |= {key: _number(limits, "limits", key) for key in ("climb_rate", "altitude") if key in limits}
     figures |= {key: _number(energy, "energy", key) for key in _ENERGY}
-    if figures["speed"] > figures["max_speed"]:
-        raise InputError(f"[limits] speed {figures['speed']} exceeds max_speed {figures['max_speed']}")
-    if document["domain"] == "aerial" and not figures.get("climb_rate"):
-        raise InputError("[limits] climb_rate of an aerial vehicle must be a number above 0, m/s")
     return VehicleModel(
         name=document["name"],
         domain=document["domain"],
@@ -121,9 +128,9 @@ def _model(document: dict[str, Any], file: str) -> VehicleModel:
 def _number(table: dict[str, Any], name: str, key: str) -> float:
     value = table.get(key)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"[{name}] {key} must be a number, not {value!r}")
-    if not (0 <= value < 1e9) or (value == 0 and key not in _MAY_BE_ZERO):
-        raise InputError(f"[{name}] {key} = {value} must be positive and finite")
+        raise InputError(f"[{name}] {key} must be a number, not {str(value)[:40]!r}")
+    if not 0 <= value < 1e9:
+        raise InputError(f"[{name}] {key} = {value:.6g} must be positive and below 1e9")
     return float(value)
 
 

@@ -162,7 +162,7 @@ def _number(path: Path, document: dict[str, Any], key: str, default: float | Non
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e12
 
 
 def _one_line(error: Exception) -> str:

@@ -6,12 +6,12 @@ with its waypoints' figures as lists, and the layers for the eye. The same missi
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
-from shapely import get_coordinates, set_coordinates
+from shapely import MultiPolygon, Point, Polygon, get_coordinates, make_valid, set_coordinates
 from shapely.errors import ShapelyError
 from shapely.geometry import shape as from_geojson
 
@@ -21,12 +21,22 @@ from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.geojson import parse
 from quarterdeck.geo.models import VehicleModel
 from quarterdeck.geo.palette import CASUALTY, colours
-from quarterdeck.geo.reader import read_bytes
+from quarterdeck.geo.properties import PROPERTIES, property_problems
+from quarterdeck.geo.reader import MAX_RADIUS, read_bytes
 from quarterdeck.geo.scenario import Area, Casualty, Obstacle, Precedence, Sensor, Site, Task, Vehicle, as_multipolygon
-from quarterdeck.mission.mission import Layer, Mission, Route, Waypoint
+from quarterdeck.geo.typed import fits, wrong_field
+from quarterdeck.mission.mission import Layer, Leg, Mission, Route, Waypoint
 
 FORMAT = 1
 DAMAGE = (KeyError, TypeError, ValueError, ArithmeticError, IndexError, AttributeError, ShapelyError)
+PARAMETERS: dict[str, Any] = {  # those that later steps read
+    "angle": float | None,
+    "edge": Literal["whole", "cells", "lap"],
+    "inspect": Literal["area", "border"],
+    "range": float | None,
+}
+GUARD = {"guard": int, "turn": int | None, "vehicle": str | None, "range": float, "seen": bool}
+LEGS = set(get_args(Leg))
 LISTS = ("leg", "speed", "hold", "time", "task")  # of a route's waypoints, in the order of its positions
 
 
@@ -160,13 +170,21 @@ def _mission(name: str, header: dict[str, Any], features: list[dict[str, Any]]) 
 
     def metres(f: dict[str, Any]) -> Any:
         place = from_geojson(f["geometry"])
-        return set_coordinates(place, frame.to_metres(get_coordinates(place)))
+        return set_coordinates(place, _metres(get_coordinates(place), frame))
 
+    def polygon(f: dict[str, Any]) -> MultiPolygon:
+        return _sound(as_multipolygon(metres(f)))
+
+    def part(f: dict[str, Any]) -> Polygon:
+        (one,) = polygon(f).geoms
+        return one
+
+    _check_properties(features)
     site = Site(
-        areas=tuple(Area(f["id"], as_multipolygon(metres(f)), f["properties"]["priority"]) for f in of("area")),
-        operating=as_multipolygon(metres(of("operating")[0])),
+        areas=tuple(Area(f["id"], polygon(f), f["properties"]["priority"]) for f in of("area")),
+        operating=polygon(of("operating")[0]),
         obstacles=tuple(
-            Obstacle(f["id"], metres(f), frozenset(f["properties"]["blocks"]), f["properties"]["height"])
+            Obstacle(f["id"], part(f), frozenset(f["properties"]["blocks"]), f["properties"]["height"])
             for f in of("obstacle")
         ),
     )
@@ -178,7 +196,7 @@ def _mission(name: str, header: dict[str, Any], features: list[dict[str, Any]]) 
     for f in of("layer"):
         properties = {k: v for k, v in f["properties"].items() if k not in ("role", "layer")}
         layers.setdefault(f["properties"]["layer"], []).append((metres(f), properties))
-    return Mission(
+    mission = Mission(
         name=name,
         frame=frame,
         site=site,
@@ -197,14 +215,63 @@ def _mission(name: str, header: dict[str, Any], features: list[dict[str, Any]]) 
         input_hash=header["input_hash"],
         version=header["version"],
     )
+    _check_types(mission)
+    return mission
+
+
+def _check_types(mission: Mission) -> None:
+    """Raise TypeError where something is not of the type that later steps take it to be of; routes have been looked at."""
+    if wrong := wrong_field(replace(mission, routes=())):
+        raise TypeError(f"its {wrong} are not what they must be")
+    for name, kind in PARAMETERS.items():
+        if name in mission.parameters and not fits(mission.parameters[name], kind):
+            raise TypeError(f"its parameter {name} is {str(mission.parameters[name])[:40]!r}")
+    guards = [layer for layer in mission.layers if layer.name == "guards"]
+    if mission.method == "guards" and len(guards) != 1:
+        raise ValueError("its guards are missing")
+    for layer in guards:
+        places = all(isinstance(g, Point) for g in layer.geometries)
+        if not places or not all(fits(dict(p), GUARD) for p in layer.properties):
+            raise TypeError("a guard is not what it must be")
+
+
+def _check_properties(features: list[dict[str, Any]]) -> None:
+    """Raise ValueError where the figures of a site's feature would be refused in a site too."""
+    for f in features:
+        given, role = f["properties"], f["properties"].get("role")
+        if role not in PROPERTIES:
+            continue
+        # Models stand in a PLAN whole, windows may be open, and what keeps to the surface has the altitude 0.
+        own = {k: v for k, v in given.items() if k in PROPERTIES[role] and k not in ("model", "window")}
+        asked = {k: v for k, v in own.items() if k != "altitude" or v != 0}
+        for problem in property_problems(role, asked):
+            raise ValueError(f"{role} {f.get('id')!r}: {problem}")
+
+
+def _sound(polygon: MultiPolygon) -> MultiPolygon:
+    """Return a polygon whose rings do not cross. Raises ValueError where they do by more than positions are rounded."""
+    if polygon.is_valid:
+        return polygon
+    mended = as_multipolygon(make_valid(polygon))
+    if abs(mended.area - polygon.area) > 0.001 * (1.0 + polygon.length):
+        raise ValueError("a polygon crosses itself")
+    return mended
+
+
+def _metres(lonlat: np.ndarray, frame: Frame) -> np.ndarray:
+    """Return (n, 2) metres. Raises ValueError for what is no place near the site."""
+    xy = frame.to_metres(lonlat)
+    if not (np.hypot(*xy.T) < 2 * MAX_RADIUS).all():
+        raise ValueError(f"a position is more than {2 * MAX_RADIUS / 1000:.0f} km from the origin")
+    return xy
 
 
 def _xy(feature: dict[str, Any], frame: Frame) -> tuple[float, float]:
-    return _metres(feature["geometry"]["coordinates"], frame)
+    return _place(feature["geometry"]["coordinates"], frame)
 
 
-def _metres(lonlat: list[float], frame: Frame) -> tuple[float, float]:
-    x, y = frame.to_metres(np.array(lonlat[:2], dtype=float))[0]
+def _place(lonlat: list[float], frame: Frame) -> tuple[float, float]:
+    x, y = _metres(np.array(lonlat[:2], dtype=float), frame)[0]
     return float(x), float(y)
 
 
@@ -217,7 +284,7 @@ def _vehicle(feature: dict[str, Any], frame: Frame) -> Vehicle:
         id=feature["id"],
         model=VehicleModel(**given["model"]),
         start=_xy(feature, frame),
-        end=_metres(given["end"], frame) if given["end"] else None,
+        end=_place(given["end"], frame) if given["end"] else None,
         sensor=Sensor(**given["sensor"]) if given["sensor"] else None,
         can=frozenset(given["can"]),
         returns=given["returns"],
@@ -236,11 +303,13 @@ def _task(feature: dict[str, Any], frame: Frame) -> Task:
 def _route(feature: dict[str, Any], frame: Frame) -> Route:
     given = feature["properties"]
     line = np.array(feature["geometry"]["coordinates"], dtype=float)[: len(given["leg"])]
-    xy = frame.to_metres(line[:, :2])
+    xy = _metres(line[:, :2], frame)
     z = line[:, 2] if line.shape[1] > 2 else np.zeros(len(line))
     columns = [given.get(name) or [None] * len(line) for name in LISTS]
     if any(len(c) != len(line) for c in columns):
         raise ValueError(f"route of {given['vehicle']}: lists of different lengths")
+    if not set(columns[0]) <= LEGS or not all(task is None or isinstance(task, str) for task in columns[-1]):
+        raise ValueError(f"route of {given['vehicle']}: a leg or a task is unknown")
     waypoints = tuple(
         Waypoint(float(x), float(y), float(h), leg, float(speed), float(hold), float(time), task)
         for (x, y), h, leg, speed, hold, time, task in zip(xy, z, *columns, strict=True)

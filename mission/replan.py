@@ -243,7 +243,7 @@ def _figures(
     area = site.coverable
     missed = uncovered([*progress.tracks, *ahead], area, float(spacing or 0.0))
     return {
-        "poc": 1.0 - missed.area / area.area,
+        "poc": 1.0 - missed.area / area.area if area.area > 0 else 1.0,
         "length": sum(track_length(t) for t in ahead),
         "makespan": max(r.duration for r in routes),
         "energy": sum(r.energy for r in routes),

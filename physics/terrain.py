@@ -1,5 +1,6 @@
 """Ground that is not flat: a grid of heights, read from a file, and how rovers stand on it."""
 
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -7,6 +8,8 @@ import numpy as np
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.mission.mission import Mission
+
+MOST_BYTES = 200_000_000  # of an NPZ unpacked
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,19 +87,34 @@ def read_terrain(path: str) -> Terrain:
     """
     try:
         if Path(path).suffix.lower() == ".npz":
-            with np.load(path) as file:
-                x, y = np.asarray(file["origin"], float)
-                return Terrain((float(x), float(y)), float(file["cell"]), np.asarray(file["heights"], float))
+            (x, y), cell, heights = _load(path)
+            return Terrain((float(x), float(y)), float(cell), heights)
         return _read_ascii(Path(path).read_text(encoding="ascii"))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror or error})") from None
     except KeyError as error:
-        raise InputError(f"{path}: has no {error}; give an NPZ of origin, cell, heights or an ESRI ASCII grid") from None
-    except (ValueError, TypeError, EOFError) as error:
-        what = str(error).splitlines()[0]
+        what = str(error.args[0]).split()[0]
+        raise InputError(f"{path}: has no {what!r}; give an NPZ of origin, cell, heights or an ESRI ASCII grid") from None
+    except (ValueError, TypeError, ArithmeticError, MemoryError) as error:
+        what = " ".join(str(error).split())[:120]
         raise InputError(f"{path}: is neither NPZ of origin, cell, heights nor an ESRI ASCII grid ({what})") from None
+
+
+def _load(path: str) -> list[np.ndarray]:
+    """Return origin, cell and heights of an NPZ file. Raises ValueError if it is damaged, or unpacks to a flood."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            unpacked = sum(entry.file_size for entry in archive.infolist())
+        if unpacked > MOST_BYTES:
+            raise ValueError(f"it unpacks to more than {MOST_BYTES // 1_000_000} MB")
+        with np.load(path) as file:
+            return [file[name].astype(float, casting="safe") for name in ("origin", "cell", "heights")]
+    except (OSError, KeyError, ValueError, TypeError, MemoryError):
+        raise
+    except Exception as error:  # zipfile's, zlib's and the tokenizer's: whatever they meet in a damaged file
+        raise ValueError(str(error)) from None
 
 
 def _read_ascii(text: str) -> Terrain:

@@ -76,16 +76,24 @@ def main(args: list[str] | None = None) -> None:
     try:
         status = group.main(args=args, prog_name="quarterdeck", standalone_mode=False)
     except QuarterdeckError as error:
-        _stop(f"quarterdeck: {error}", 2)
+        _stop(f"quarterdeck: {_line(str(error))}", 2)
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)
     except (click.Abort, KeyboardInterrupt):
         _stop("quarterdeck: interrupted", 130)
+    except MemoryError:
+        _stop("quarterdeck: out of memory; give a larger spacing or resolution, or a smaller site", 2)
     except BrokenPipeError:  # the reader of our standard output has gone: nothing is wrong
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _line(text: str) -> str:
+    """Return one line of at most 1000 characters: names from files may hold line ends, or what would steer a terminal."""
+    text = "".join(c if c.isprintable() else " " if c.isspace() else "\ufffd" for c in " ".join(text.split()))
+    return text if len(text) <= 1000 else f"{text[:997]}..."
 
 
 def _stop(text: str, status: int) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from quarterdeck.cli.output import console, emit, force_option, minutes, output_option, print_reason, seed_option
-from quarterdeck.cli.parameters import Numbers
+from quarterdeck.cli.parameters import Choice, Numbers, Real
 
 if TYPE_CHECKING:
     from quarterdeck.geo.scenario import Scenario
@@ -43,7 +43,7 @@ class PriorityFunction(click.ParamType):
 @click.command(short_help="Visit tasks with priority, time and precedence.")
 @click.argument("site", default="-")
 @output_option
-@click.option("--objective", type=click.Choice(["operator", "paper"]), default="operator", show_default=True,
+@click.option("--objective", type=Choice(["operator", "paper"]), default="operator", show_default=True,
               help="Makespan and urgency in seconds; or eq. 4-6 of the paper and its own genetic algorithm.")  # fmt: skip
 @click.option("--weights", type=Numbers("W0,W1,W2,W3", 4), default="0,0.1,0.3,1", show_default=True,
               help="What a second until a task starts costs, by priority, in seconds of makespan.")  # fmt: skip
@@ -55,11 +55,11 @@ class PriorityFunction(click.ParamType):
 )
 @click.option("--map-origin", type=Numbers("LON,LAT", 2), help="Where the map's (0, 0) lies; default the site's centre.")
 @click.option("--write-map", metavar="FILE.yaml", help="Write the site's ground map for map_server, .yaml and .pgm.")
-@click.option("--resolution", type=click.FloatRange(min=0, min_open=True), help="Side of the map's cells, m.")
-@click.option("--heuristic", type=click.Choice(["none", "octile", "manhattan"]), default="none", show_default=True,
+@click.option("--resolution", type=Real(min=0, min_open=True), help="Side of the map's cells, m.")
+@click.option("--heuristic", type=Choice(["none", "octile", "manhattan"]), default="none", show_default=True,
               help="Dijkstra; A*; or A* with the paper's heuristic, inadmissible: ways may be longer.")  # fmt: skip
 @click.option("--iterations", type=click.IntRange(min=1), default=100, show_default=True, help="Generations of the search.")
-@click.option("--time-limit", type=click.FloatRange(min=0, min_open=True),
+@click.option("--time-limit", type=Real(min=0, min_open=True),
               help="Seconds after which the search ends; the same seed may then give another plan.")  # fmt: skip
 @seed_option
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on standard error instead of a table.")

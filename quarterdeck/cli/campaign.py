@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from quarterdeck.cli.output import console, force_option, print_reason
+from quarterdeck.cli.parameters import Real
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -32,9 +33,7 @@ MOST_MEANS = 12  # combinations whose means are printed; those of more are in su
 @click.option(
     "--worst", type=click.IntRange(min=0), default=5, show_default=True, help="How many of the worst runs to tell."
 )
-@click.option(
-    "--least", type=click.FloatRange(0, 1), help="Exit with 1 if the probability of success may be less (95 % confidence)."
-)
+@click.option("--least", type=Real(0, 1), help="Exit with 1 if the probability of success may be less (95 % confidence).")
 @click.option("--json", "as_json", is_flag=True, help="Write the summary as JSON to standard output.")
 @force_option
 def command(

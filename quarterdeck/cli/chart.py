@@ -3,20 +3,21 @@
 import click
 
 from quarterdeck.cli.output import emit, force_option, output_option
+from quarterdeck.cli.parameters import Numbers, Real
 
 
 @click.command(short_help="ENC cells as a site.")
 @click.argument("cells", nargs=-1, required=True)
-@click.option("--draught", type=click.FloatRange(min=0), required=True, help="Metres that the vessels go down.")
-@click.option("--clearance", type=click.FloatRange(min=0), default=0.5, show_default=True, help="Metres below the keel.")
+@click.option("--draught", type=Real(min=0), required=True, help="Metres that the vessels go down.")
+@click.option("--clearance", type=Real(min=0), default=0.5, show_default=True, help="Metres below the keel.")
 @click.option(
-    "--tide", type=float, default=0.0, show_default=True, help="Metres of water above chart datum, at the lowest."
+    "--tide", type=Real(), default=0.0, show_default=True, help="Metres of water above chart datum, at the lowest."
 )
-@click.option("--margin", type=click.FloatRange(min=0), default=10.0, show_default=True, help="Metres kept from dangers.")
+@click.option("--margin", type=Real(min=0), default=10.0, show_default=True, help="Metres kept from dangers.")
 @click.option("--avoid", default="", help="Classes not to be entered, parted by commas, such as RESARE,TSSLPT.")
-@click.option("--bounds", default="", metavar="W,S,E,N", help="Degrees to cut the chart to.")
-@click.option("--start", "starts", multiple=True, metavar="LON,LAT", help="Where a vessel starts; repeatable.")
-@click.option("--spacing", type=click.FloatRange(min=0, min_open=True), help="Metres between tracks, kept in the site.")
+@click.option("--bounds", type=Numbers("W,S,E,N", 4), help="Degrees to cut the chart to.")
+@click.option("--start", "starts", type=Numbers("LON,LAT", 2), multiple=True, help="Where a vessel starts; repeatable.")
+@click.option("--spacing", type=Real(min=0, min_open=True), help="Metres between tracks, kept in the site.")
 @output_option
 @force_option
 def command(
@@ -26,8 +27,8 @@ def command(
     tide: float,
     margin: float,
     avoid: str,
-    bounds: str,
-    starts: tuple[str, ...],
+    bounds: tuple[float, float, float, float] | None,
+    starts: tuple[tuple[float, float], ...],
     spacing: float | None,
     output: str,
     force: bool,
@@ -41,25 +42,15 @@ def command(
     from quarterdeck.geo.charts import chart_site, read_cell
     from quarterdeck.geo.writer import site_text
 
-    vehicles = [(f"usv-{i}", *_numbers(text, 2, "--start")) for i, text in enumerate(starts, 1)]
+    vehicles = [(f"usv-{i}", *lonlat) for i, lonlat in enumerate(starts, 1)]
     scenario, notes = chart_site(
         [read_cell(path) for path in cells],
         depth=draught + clearance - tide,
         margin=margin,
         avoid=tuple(name.strip().upper() for name in avoid.split(",") if name.strip()),
-        bounds=_numbers(bounds, 4, "--bounds") if bounds else None,
+        bounds=bounds,
         vehicles=vehicles,
     )
     emit(site_text(replace(scenario, spacing=spacing)), output, force=force)
     for note in (*notes, "not for navigation"):
         click.echo(note, err=True)
-
-
-def _numbers(text: str, count: int, option: str) -> tuple:
-    try:
-        numbers = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        numbers = ()
-    if len(numbers) != count:
-        raise click.BadParameter(f"{text!r} is not {count} numbers with commas", param_hint=option)
-    return numbers

@@ -6,6 +6,7 @@ from typing import Any
 import click
 
 from quarterdeck.cli.output import force_option
+from quarterdeck.cli.parameters import Real
 
 
 @click.command(short_help="Autopilot and ECDIS files, recording, pictures.")
@@ -14,7 +15,7 @@ from quarterdeck.cli.output import force_option
 @click.option("-o", "--out", default=".", show_default=True, help="The folder to write into.")
 @click.option("--autopilot", default="ardupilot", show_default=True, help="Whom mission files are for: ardupilot or px4.")
 @click.option("--altitude", default="relative", show_default=True, help="What heights count from: relative, terrain, amsl.")
-@click.option("--ground", type=float, help="Metres of the ground above mean sea level, for amsl.")
+@click.option("--ground", type=Real(), help="Metres of the ground above mean sea level, for amsl.")
 @click.option("--sorties", is_flag=True, help="Split what is beyond a vehicle's endurance into sorties, a folder each.")
 @force_option
 def command(

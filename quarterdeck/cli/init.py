@@ -5,6 +5,7 @@ from importlib.resources import files
 import click
 
 from quarterdeck.cli.output import emit, force_option, output_option
+from quarterdeck.cli.parameters import Choice
 
 SAMPLES = {
     "sea": "west_ant_island",
@@ -16,7 +17,7 @@ SAMPLES = {
 
 
 @click.command(short_help="A small site to start from.")
-@click.argument("kind", type=click.Choice(list(SAMPLES)), default="sea")
+@click.argument("kind", type=Choice(list(SAMPLES)), default="sea")
 @output_option
 @force_option
 def command(kind: str, output: str, force: bool) -> None:

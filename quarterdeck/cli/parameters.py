@@ -1,9 +1,33 @@
 """Kinds of option values that several commands take."""
 
 import math
+from difflib import get_close_matches
 from typing import Any
 
 import click
+
+
+class Real(click.FloatRange):
+    """A finite number, within limits where they are given."""
+
+    name = "float"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number."""
+        number = super().convert(value, param, ctx)
+        if not abs(number) <= 1e12:
+            self.fail(f"{value!r} is not a finite number up to 1e12", param, ctx)
+        return number
+
+
+class Choice(click.Choice[str]):
+    """One of some words; what is none is answered with the nearest."""
+
+    def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:
+        """Return what to say of a word that is none."""
+        near = get_close_matches(str(value), [str(choice) for choice in self.choices], n=1)
+        known = super().get_invalid_choice_message(value, ctx)
+        return f"{known} Did you mean {near[0]!r}?" if near else known
 
 
 class Numbers(click.ParamType):
@@ -21,6 +45,6 @@ class Numbers(click.ParamType):
             numbers = tuple(float(part) for part in value.split(","))
         except ValueError:
             self.fail(f"{value!r} is not {self.name}: numbers with commas", param, ctx)
-        if len(numbers) not in self.counts or not all(map(math.isfinite, numbers)):
+        if len(numbers) not in self.counts or not all(math.isfinite(number) for number in numbers):
             self.fail(f"{value!r} is not {self.name}", param, ctx)
         return numbers

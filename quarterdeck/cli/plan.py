@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from quarterdeck.cli.output import emit, force_option, output_option, print_figures, seed_option
-from quarterdeck.cli.parameters import Numbers
+from quarterdeck.cli.parameters import Choice, Numbers, Real
 
 if TYPE_CHECKING:
     from quarterdeck.api import Method
@@ -23,27 +23,25 @@ OPTIONS = {
 @click.command(short_help="Cover an area.")
 @click.argument("site", default="-")
 @output_option
-@click.option("--method", type=click.Choice(list(OPTIONS)),
+@click.option("--method", type=Choice(list(OPTIONS)),
               help="stc: spanning trees; lines: parallel lines (default where a vehicle has a sensor); "
               "guards: all seen from within a range.")  # fmt: skip
-@click.option("--spacing", type=float, help="stc, lines: metres between neighbouring tracks (the paper's 2 delta).")
-@click.option("--placement", type=click.Choice(["annealed", "paper", "none"]),
+@click.option("--spacing", type=Real(), help="stc, lines: metres between neighbouring tracks (the paper's 2 delta).")
+@click.option("--placement", type=Choice(["annealed", "paper", "none"]),
               help="stc: how the grid is placed: annealed (default), as Algorithm 1 is printed, or not.")  # fmt: skip
-@click.option("--angle", type=float, help="stc, lines: fix the tracks' direction: compass degrees.")
-@click.option("--edge", type=click.Choice(["whole", "cells", "lap"]),
+@click.option("--angle", type=Real(), help="stc, lines: fix the tracks' direction: compass degrees.")
+@click.option("--edge", type=Choice(["whole", "cells", "lap"]),
               help="stc: how far tracks reach: whole 2 x 2 cells, every free cell (default), or laps too.")  # fmt: skip
-@click.option("--run", type=float, help="lines: metres driven straight before and after each line.")
+@click.option("--run", type=Real(), help="lines: metres driven straight before and after each line.")
 @click.option("--cross-every", type=int, help="lines: add lines across, so many spacings apart (1: a crosshatch).")
 @click.option("--entry", type=Numbers("LON,LAT", 2), help="lines: begin at the end of a line nearest to this point.")
 @click.option("--alternate", type=click.IntRange(min=2), metavar="N",
               help="lines: drive every Nth line first, the skipped ones on the way back: room for wide turns.")  # fmt: skip
 @click.option("--lap", is_flag=True, default=None,
               help="lines: first one lap along the border and around obstacles, half a spacing in.")  # fmt: skip
-@click.option("--range", type=float, help="guards: metres that vehicles see which have no range of their own.")
-@click.option("--mode", type=click.Choice(["optimised", "paper"]), help="guards: as the paper, or better (default).")
-@click.option(
-    "--inspect", type=click.Choice(["area", "border"]), help="guards: see all of the area (default), or all edges."
-)
+@click.option("--range", type=Real(), help="guards: metres that vehicles see which have no range of their own.")
+@click.option("--mode", type=Choice(["optimised", "paper"]), help="guards: as the paper, or better (default).")
+@click.option("--inspect", type=Choice(["area", "border"]), help="guards: see all of the area (default), or all edges.")
 @seed_option
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on standard error instead of a table.")
 @force_option

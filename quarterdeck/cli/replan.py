@@ -3,12 +3,13 @@
 import click
 
 from quarterdeck.cli.output import emit, force_option, output_option, print_figures
+from quarterdeck.cli.parameters import Real
 
 
 @click.command(short_help="From what has happened so far: losses, additions, withdrawals.")
 @click.argument("plan")
 @output_option
-@click.option("--at", "time", type=click.FloatRange(min=0), required=True, help="Seconds since the mission's start.")
+@click.option("--at", "time", type=Real(min=0), required=True, help="Seconds since the mission's start.")
 @click.option("--lost", default="", help="Ids of the vehicles that are lost, with commas; ID@SECONDS: since when.")
 @click.option("--add", metavar="SITE", help="GeoJSON of what is new: obstacles, areas, tasks, vehicles that join.")
 @click.option("--gone", default="", help="Ids of obstacles that are no more, with commas.")

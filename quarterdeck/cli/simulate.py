@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from quarterdeck.cli.output import console, digest, emit, force_option, minutes, not_there, print_reason, seed_option
+from quarterdeck.cli.parameters import Choice, Real
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -60,9 +61,7 @@ class Limit(click.ParamType):
 @click.option("--picture", metavar="FILE", callback=not_there, help="Draw plan, tracks and misses as a PNG.")
 @click.option("--current", type=Vector(), default="0,0", show_default=True, help="Water's motion, m/s east and north.")
 @click.option("--wind", type=Vector(), default="0,0", show_default=True, help="Mean wind, m/s towards east and north.")
-@click.option(
-    "--gusts", type=click.FloatRange(min=0), default=0.0, show_default=True, help="Standard deviation of gusts, m/s."
-)
+@click.option("--gusts", type=Real(min=0), default=0.0, show_default=True, help="Standard deviation of gusts, m/s.")
 @click.option(
     "--fail",
     "faults",
@@ -71,16 +70,14 @@ class Limit(click.ParamType):
     help="What goes wrong: usv-2@600 (lost), gnss:usv-1@300-420, thruster:usv-3@100, comms:usv-1@50, random:3; repeatable.",
 )
 @click.option("--recover", is_flag=True, help="Replan in the run when a vehicle is lost or comes back.")
-@click.option("--delay", type=click.FloatRange(min=0), default=30.0, show_default=True,
+@click.option("--delay", type=Real(min=0), default=30.0, show_default=True,
               help="Seconds without a word before a vehicle is given up (with --recover).")  # fmt: skip
-@click.option(
-    "--gnss", type=click.Choice(["rtk", "sbas", "single"]), help="Receivers with errors, instead of perfect ones."
-)
+@click.option("--gnss", type=Choice(["rtk", "sbas", "single"]), help="Receivers with errors, instead of perfect ones.")
 @click.option("--lidar", is_flag=True, help="Ground robots see by lidar, and steer clear of what is in their way.")
 @click.option("--amcl", is_flag=True, help="Ground robots localise by their lidar on the site's map (implies --lidar).")
 @click.option(
     "--field",
-    type=click.Choice(["scaled", "paper"]),
+    type=Choice(["scaled", "paper"]),
     default="scaled",
     show_default=True,
     help="The potential field of robots with lidar: scaled by the goal's distance, or the inspection paper's.",
@@ -93,9 +90,7 @@ class Limit(click.ParamType):
 @click.option(
     "--limit", "limits", type=Limit(), multiple=True, help="A limit of the verdict; repeatable. See docs/simulation.md."
 )
-@click.option(
-    "--step", type=click.FloatRange(0.001, 0.1), default=0.1, show_default=True, help="Seconds a step of the world."
-)
+@click.option("--step", type=Real(0.001, 0.1), default=0.1, show_default=True, help="Seconds a step of the world.")
 @click.option("--json", "as_json", is_flag=True, help="Write the report as JSON to standard output.")
 @force_option
 def command(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from quarterdeck.cli.output import console, emit, force_option, not_there, output_option, print_reason, seed_option
+from quarterdeck.cli.parameters import Choice, Real
 
 if TYPE_CHECKING:
     from quarterdeck.geo.scenario import Scenario
@@ -58,13 +59,13 @@ class Treat(click.ParamType):
         return {colour: number} if colour else dict.fromkeys(COLOURS, number)
 
 
-_AMOUNT = click.FloatRange(min=0, min_open=True, max=1e9)
-_FROM_ZERO = click.FloatRange(min=0, max=1e9)
+_AMOUNT = Real(min=0, min_open=True, max=1e9)
+_FROM_ZERO = Real(min=0, max=1e9)
 
 
 @click.command(short_help="Search, relay, treat; the four methods.")
 @click.argument("site", required=False)
-@click.option("--method", type=click.Choice(METHODS), default="relay", show_default=True, help="Who tells the medic, how.")
+@click.option("--method", type=Choice(METHODS), default="relay", show_default=True, help="Who tells the medic, how.")
 @click.option("--compare", is_flag=True, help="Run all four methods and print their figures side by side.")
 @output_option
 @click.option("--casualty-csv", metavar="FILE", callback=not_there, help="Write a row a casualty.")
@@ -88,9 +89,9 @@ _FROM_ZERO = click.FloatRange(min=0, max=1e9)
               help="UGVs, UAVs and medics without SITE.")  # fmt: skip
 @seed_option
 @click.option(
-    "--order", type=click.Choice(["priority", "nearest", "first-come"]), help="How medics choose; default the method's."
+    "--order", type=Choice(["priority", "nearest", "first-come"]), help="How medics choose; default the method's."
 )
-@click.option("--rendezvous", type=click.Choice(["fixed", "moving", "round-robin"]), default="fixed", show_default=True,
+@click.option("--rendezvous", type=Choice(["fixed", "moving", "round-robin"]), default="fixed", show_default=True,
               help="Where UAVs are met: at a point, in the UGVs' middle, or they visit each UGV in turn.")  # fmt: skip
 @click.option(
     "--medic-unknown", is_flag=True, help="Without a relay, UGVs do not know where the medics are and look for them."
@@ -111,7 +112,7 @@ _FROM_ZERO = click.FloatRange(min=0, max=1e9)
 @click.option("--helpers", type=click.IntRange(min=0), default=0, show_default=True,
               help="Green casualties recruited after treatment; each shortens the next ones by a quarter.")  # fmt: skip
 @click.option("--fatigue", type=_FROM_ZERO, default=0.0, show_default=True, help="Part of a medic's speed lost in 100 m.")
-@click.option("--confidence", type=click.FloatRange(0, 1), default=1.0, show_default=True, help="That a robot sorts right.")
+@click.option("--confidence", type=Real(0, 1), default=1.0, show_default=True, help="That a robot sorts right.")
 @click.option("--position-error", type=_FROM_ZERO, default=0.0, show_default=True, help="Of a robot's word, 1 sigma, m.")
 @force_option
 def command(site: str | None, generate: int | None, output: str, force: bool, seed: int, **options: Any) -> int:

@@ -1,0 +1,436 @@
+"""What is fed to whom: for each target, sound files, which of them are damaged, and the command line that reads them."""
+
+import io
+import json
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from fuzzing.mutate import damaged
+
+DATA = Path(__file__).parents[3] / "data"
+FORMATS = (
+    "csv",
+    "geojson",
+    "gpx",
+    "html",
+    "kml",
+    "kmz",
+    "moos",
+    "nav2",
+    "qgc-plan",
+    "qgc-wpl",
+    "qgis",
+    "rtz",
+    "rtz-1.2",
+    "all",
+)
+ODD = (
+    "2.5",
+    "3",
+    "30",
+    "0.01",
+    "100000",
+    "1,1",
+    "",
+    "0",
+    "-1",
+    "nan",
+    "inf",
+    "1e400",
+    "1e-9",
+    "x",
+    "1,2",
+    "é",
+    "999999999999",
+    "--",
+    "-",
+    "0.5",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """Files by name, a command line, and which file is standard input, if any."""
+
+    files: dict[str, bytes]
+    args: list[str]
+    stdin: str | None = None
+
+
+Maker = Callable[[np.random.Generator], Request]
+
+
+def small_site(domain: str = "ground") -> bytes:
+    """Return a site of 50 x 30 m with everything in it: two vehicles, an obstacle, three tasks, casualties, a medic."""
+    lon, lat = 1 / 65000, 1 / 111000  # degrees a metre, nearly, at 54 degrees north
+
+    def at(x: float, y: float) -> list[float]:
+        return [round(10 + x * lon, 7), round(54 + y * lat, 7)]
+
+    def feature(role: str, kind: str, coordinates: object, **properties: object) -> dict:
+        geometry = {"type": kind, "coordinates": coordinates}
+        return {"type": "Feature", "properties": {"role": role} | properties, "geometry": geometry}
+
+    def box(x0: float, y0: float, x1: float, y1: float) -> list:
+        return [[at(x0, y0), at(x1, y0), at(x1, y1), at(x0, y1), at(x0, y0)]]
+
+    features = [
+        feature("area", "Polygon", box(0, 0, 50, 30), id="field", spacing=5.0),
+        feature("operating", "Polygon", box(-15, -15, 65, 45)),
+        feature("obstacle", "Polygon", box(20, 10, 24, 15), id="shed", height=4.0),
+        feature("vehicle", "Point", at(-5, -5), id="v1", domain=domain, range=12.0, can=["look"]),
+        feature("vehicle", "Point", at(55, -5), id="v2", domain=domain, range=12.0, endurance=4000.0, end=at(50, -5)),
+        feature("task", "Point", at(5, 5), id="t1", priority=3, service_time=10.0),
+        feature("task", "Point", at(40, 25), id="t2", after=["t1"], window=[0, 900]),
+        feature("task", "Point", at(30, 5), id="t3", needs=["look"], after=[{"task": "t2", "mode": "same_robot"}]),
+        feature("casualty", "Point", at(10, 20), id="c1", colour="red"),
+        feature("casualty", "Point", at(35, 20), id="c2", colour="yellow"),
+        feature("medic", "Point", at(-5, 0), id="m1"),
+        feature("rendezvous", "Point", at(0, 15), id="r1"),
+    ]
+    return json.dumps({"type": "FeatureCollection", "name": "small", "features": features}).encode()
+
+
+KML = b"""<?xml version="1.0"?><kml xmlns="http://www.opengis.net/kml/2.2"><Document>
+<Placemark><name>field</name><Polygon><outerBoundaryIs><LinearRing><coordinates>
+10,54,0 10.01,54,0 10.01,54.01,0 10,54.01,0 10,54,0</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark>
+<Folder><name>No-fly zones</name><Placemark><name>mast</name><Polygon><outerBoundaryIs><LinearRing><coordinates>
+10.004,54.004 10.005,54.004 10.005,54.005 10.004,54.004</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark>
+</Folder>
+<Placemark><name>north start</name><Point><coordinates>10.001,54.001,3</coordinates></Point></Placemark>
+<Placemark><name>pump</name><Point><coordinates>10.002,54.002</coordinates></Point></Placemark></Document></kml>"""
+GPX = b"""<gpx xmlns="http://www.topografix.com/GPX/1/1" version="1.1" creator="t">
+<wpt lat="54.1" lon="10.1"><name>a</name></wpt>
+<rte><rtept lat="54.2" lon="10.2"><name>a</name></rtept><rtept lat="54.3" lon="10.3"/></rte></gpx>"""
+QGC = json.dumps(
+    {
+        "fileType": "Plan",
+        "version": 1,
+        "groundStation": "QGroundControl",
+        "mission": {
+            "items": [
+                {
+                    "type": "ComplexItem",
+                    "complexItemType": "survey",
+                    "polygon": [[54, 10], [54, 10.01], [54.01, 10.01]],
+                    "TransectStyleComplexItem": {"CameraCalc": {"AdjustedFootprintSide": 25}},
+                }
+            ],
+            "plannedHomePosition": [54.001, 10.002, 0],
+            "vehicleType": 11,
+        },
+        "geoFence": {
+            "polygons": [{"inclusion": True, "polygon": [[53.99, 9.99], [53.99, 10.02], [54.02, 10.02], [54.02, 9.99]]}],
+            "circles": [{"inclusion": False, "circle": {"center": [54.002, 10.006], "radius": 50.0}}],
+        },
+    }
+).encode()
+MAP = b"""image: map.pgm
+resolution: 0.5
+origin: [-20.0, -20.0, 0.0]
+negate: 0
+occupied_thresh: 0.65
+free_thresh: 0.196
+"""
+TERRAIN = b"ncols 5\nnrows 4\nxllcorner -60\nyllcorner -60\ncellsize 40\nnodata_value -9999\n" + b"0 1 2 1 0\n" * 4
+STUDY = b"""plan = "stc.geojson"
+runs = 2
+seed = 3
+
+[conditions]
+current_speed = [0.0, 0.2]
+current_towards = { uniform = [0, 360] }
+wind_speed = { normal = [2, 1] }
+wind_from = 270
+gusts = 0.5
+faults = [[], ["random:1"]]
+
+[limits]
+cross_track = 5.0
+"""
+DRILL = b"""runs = 2
+seed = 1
+
+[triage]
+site = "site.geojson"
+method = ["relay", "constant"]
+casualties = [1, 3]
+medic_speed = { uniform = [1.0, 1.6] }
+treat = [10, 60]
+"""
+DISTANCES = json.dumps({"dist": [[abs(i - j) * 2.0 for i in range(7)] for j in range(7)]}).encode()
+
+
+def packed(members: dict[str, bytes]) -> bytes:
+    """Return a zip file."""
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    return made.getvalue()
+
+
+def _image() -> bytes:
+    grey = np.full((160, 240), 254, np.uint8)
+    grey[70:80, 100:120] = 0
+    grey[:4], grey[-4:] = 205, 205
+    return b"P5\n240 160\n255\n" + grey.tobytes()
+
+
+def _terrain_npz() -> bytes:
+    made = io.BytesIO()
+    np.savez(made, origin=np.array([-60.0, -60.0]), cell=np.array(40.0), heights=np.zeros((4, 5)))
+    return made.getvalue()
+
+
+def sites() -> dict[str, bytes]:
+    """Return sound sites by file name, one of each format and kind."""
+    own = {path.name: path.read_bytes() for path in sorted(DATA.glob("*.geojson"))}
+    small = {f"{domain}.geojson": small_site(domain) for domain in ("ground", "surface", "aerial")}
+    return own | small | {"site.kml": KML, "site.kmz": packed({"doc.kml": KML}), "site.gpx": GPX, "site.plan": QGC}
+
+
+def plan_arguments() -> dict[str, list[str]]:
+    """Return the command lines that make the sound PLANs from `site.geojson`, by the plans' names."""
+    return {
+        "stc.geojson": ["plan", "site.geojson", "--method", "stc"],
+        "lines.geojson": ["plan", "site.geojson", "--method", "lines", "--run", "4"],
+        "guards.geojson": ["plan", "site.geojson", "--method", "guards", "--range", "25"],
+        "tasks.geojson": ["assign", "site.geojson", "--iterations", "2"],
+    }
+
+
+def targets(plans: dict[str, bytes]) -> dict[str, tuple[int, Maker]]:
+    """Return each target's weight and what makes a request for it; `plans` are sound PLANs by name."""
+    whole = sites()
+    small = {name: whole[name] for name in ("ground.geojson", "surface.geojson", "aerial.geojson")}
+    toml = {path.name: path.read_bytes() for path in sorted((DATA / "vehicles").glob("*.toml"))}
+    pictures = {"map.pgm": _image()}
+    chart = {name: (DATA / name).read_bytes() for name in ("sample_chart.000", "sample_chart.001")}
+    terrains = {"terrain.asc": TERRAIN, "terrain.npz": _terrain_npz()}
+
+    def check_site(rng: np.random.Generator) -> Request:
+        name, data = _one(whole, rng)
+        return _with_stdin(name, damaged(name, data, rng), ["check"], rng)
+
+    def check_plan(rng: np.random.Generator) -> Request:
+        name, data = _one(plans, rng)
+        return _with_stdin(name, damaged(name, data, rng), ["check"], rng)
+
+    def vehicle(rng: np.random.Generator) -> Request:
+        name, data = _one(toml, rng)
+        domain = (
+            "aerial"
+            if "quad" in name or "crazy" in name
+            else "surface"
+            if name in ("otter.toml", "wam-v.toml")
+            else "ground"
+        )
+        site = small_site(domain).replace(b'"id": "v1"', b'"id": "v1", "model": "own.toml"')
+        verb = _pick(
+            rng, ["check", "site.geojson"], ["check", "site.geojson"], ["plan", "site.geojson", "--placement", "none"]
+        )
+        return Request({"own.toml": damaged(name, data, rng), "site.geojson": site}, verb)
+
+    def plan(rng: np.random.Generator) -> Request:
+        name, data = _one(small, rng)
+        data = damaged(name, data, rng) if rng.random() < 0.8 else data
+        method = _pick(
+            rng,
+            ["stc", "--placement", "none"],
+            ["stc", "--edge", "lap"],
+            ["lines", "--run", "3"],
+            ["lines", "--lap"],
+            ["guards"],
+            ["guards", "--inspect", "border"],
+        )
+        odd = _options(rng, "--spacing", "--angle", "--range", "--run", "--cross-every", "--entry", "--alternate", "--seed")
+        return _with_stdin(name, data, ["plan", "-o", "out/plan.geojson", "--method", *method, *odd], rng)
+
+    def assign(rng: np.random.Generator) -> Request:
+        odd = _options(
+            rng, "--weights", "--priority-function", "--resolution", "--iterations", "--map-origin", "--heuristic"
+        )
+        args = ["assign", "-o", "out/plan.geojson", "--iterations", "2", *odd]
+        if rng.random() < 0.4:
+            which = rng.random()
+            files = {
+                "map.yaml": damaged("map.yaml", MAP, rng) if which < 0.7 else MAP,
+                "map.pgm": damaged("map.pgm", pictures["map.pgm"], rng) if which > 0.6 else pictures["map.pgm"],
+                "site.geojson": small["ground.geojson"],
+            }
+            return Request(files, [*args, "site.geojson", "--map", "map.yaml"])
+        name, data = _one(small, rng)
+        objective = _pick(rng, [], [], ["--tiers"], ["--objective", "paper"], ["--write-map", "out/map.yaml"])
+        return _with_stdin(name, damaged(name, data, rng), [*args, *objective], rng)
+
+    def triage(rng: np.random.Generator) -> Request:
+        name = _pick(rng, "triage_drill.geojson", "ground.geojson")
+        odd = _options(
+            rng, "--fail", "--treat", "--talk", "--order", "--medic-speed", "--spacing", "--clusters", "--confidence"
+        )
+        extra = _pick(
+            rng,
+            [],
+            ["--casualty-csv", "out/c.csv", "--log-csv", "out/log.csv"],
+            ["--generate", "1"],
+            ["--compare"],
+            ["--cot", "out/cot.xml", "--start", "2026-05-01T09:00:00Z"],
+            ["--rendezvous", "moving"],
+        )
+        data = damaged(name, whole[name], rng)
+        return _with_stdin(name, data, ["triage", "-o", "out/t.geojson", *extra, *odd], rng)
+
+    def simulate(rng: np.random.Generator) -> Request:
+        name, data = _one(plans, rng)
+        files, kind = {name: data}, rng.random()
+        args = ["simulate", name, "--report", "out/report.json"]
+        if kind < 0.4:
+            files[name] = damaged(name, data, rng)
+        elif kind < 0.75:
+            ground, heights = _one(terrains, rng)
+            files[ground] = damaged(ground, heights, rng)
+            args += ["--terrain", ground]
+        else:
+            files["more.geojson"] = damaged("a.geojson", small["ground.geojson"], rng)
+            args += ["--unmapped", "more.geojson"]
+        odd = _options(rng, "--current", "--wind", "--gusts", "--fail", "--delay", "--limit", "--step", "--seed")
+        return Request(
+            files, [*args, *odd, *_pick(rng, [], [], ["--recover"], ["--gnss", "sbas"], ["--lidar"], ["--json"])]
+        )
+
+    def replan(rng: np.random.Generator) -> Request:
+        name, data = _one(plans, rng)
+        args = ["replan", name, "-o", "out/after.geojson", "--at", _pick(rng, "0", "20", "100", "1e9", *ODD)]
+        if rng.random() < 0.5:
+            files = {name: damaged(name, data, rng)}
+        else:
+            files = {name: data, "add.geojson": damaged("a.geojson", small["ground.geojson"], rng)}
+            args += ["--add", "add.geojson"]
+        return Request(
+            files,
+            [
+                *args,
+                *_pick(rng, [], ["--lost", "v2"], ["--lost", "v2@10"], ["--gone", "shed"], ["--withdrawn", "t1"]),
+                *_options(rng, "--lost", "--gone", "--withdrawn", "--seed"),
+            ],
+        )
+
+    def export(rng: np.random.Generator) -> Request:
+        name, data = _one(plans, rng)
+        odd = _options(rng, "--autopilot", "--altitude", "--ground")
+        to = _pick(rng, *FORMATS[:-1], "csv,gpx,rtz,kml", *ODD[:3]) if rng.random() < 0.98 else "all"
+        args = ["export", "-o", "out/files", "--to", to, *_pick(rng, [], ["--sorties"], ["--autopilot", "px4"]), *odd]
+        return _with_stdin(name, damaged(name, data, rng), args, rng)
+
+    def charts(rng: np.random.Generator) -> Request:
+        which = _pick(rng, "sample_chart.000", "sample_chart.001")
+        files = chart | {which: damaged(which, chart[which], rng)}
+        odd = _options(rng, "--tide", "--margin", "--avoid", "--bounds", "--start", "--spacing", "--clearance")
+        return Request(files, ["chart", "sample_chart.000", "--draught", "1.5", "-o", "out/site.geojson", *odd])
+
+    def campaign(rng: np.random.Generator) -> Request:
+        study = _pick(rng, STUDY, DRILL)
+        files = {"study.toml": damaged("study.toml", study, rng), "site.geojson": small["ground.geojson"]}
+        return Request(
+            plans | files, ["campaign", "study.toml", "-o", "out/runs", "--jobs", "1", *_options(rng, "--least", "--worst")]
+        )
+
+    def reproduce(rng: np.random.Generator) -> Request:
+        if rng.random() < 0.7:
+            files = {"d.json": damaged("d.json", DISTANCES, rng)}
+            return Request(files, ["reproduce", "inspection", "--distances", "d.json", "--json"])
+        files = {"room.geojson": damaged("a.geojson", _room(), rng)}
+        return Request(files, ["reproduce", "guards", "room.geojson", "--robots", "2", "--json", *_options(rng, "--range")])
+
+    def arguments(rng: np.random.Generator) -> Request:
+        words = (
+            "check",
+            "plan",
+            "assign",
+            "triage",
+            "simulate",
+            "replan",
+            "export",
+            "chart",
+            "campaign",
+            "reproduce",
+            "init",
+        )
+        options = (
+            "--help",
+            "--force",
+            "--to",
+            "--spacing",
+            "--at",
+            "-o",
+            "--json",
+            "--seed",
+            "--draught",
+            "--method",
+            "--fail",
+            "site.geojson",
+            "stc.geojson",
+            "out",
+            "out/x/y.geojson",
+            "sea",
+            "harbour",
+            "guards",
+            "no such",
+            *ODD,
+        )
+        count = int(rng.integers(0, 6))
+        args = [
+            _pick(rng, *words) if rng.random() < 0.95 else _pick(rng, *ODD),
+            *(_pick(rng, *options) for _ in range(count)),
+        ]
+        if args[0] == "reproduce":  # its studies are long by nature
+            args.append("--no-such-option")
+        return Request({"site.geojson": small["ground.geojson"], "stc.geojson": plans["stc.geojson"]}, args)
+
+    return {
+        "check_site": (40, check_site),
+        "check_plan": (14, check_plan),
+        "vehicle": (8, vehicle),
+        "plan": (8, plan),
+        "assign": (6, assign),
+        "triage": (4, triage),
+        "simulate": (3, simulate),
+        "replan": (4, replan),
+        "export": (6, export),
+        "charts": (5, charts),
+        "campaign": (2, campaign),
+        "reproduce": (1, reproduce),
+        "arguments": (4, arguments),
+    }
+
+
+def _room() -> bytes:
+    ring = [[0, 0], [30, 0], [30, 20], [0, 20], [0, 0]]
+    hole = [[10, 8], [14, 8], [14, 12], [10, 12], [10, 8]]
+    geometry = {"type": "Polygon", "coordinates": [ring, hole]}
+    return json.dumps(
+        {"type": "FeatureCollection", "features": [{"type": "Feature", "properties": {}, "geometry": geometry}]}
+    ).encode()
+
+
+def _one(files: dict[str, bytes], rng: np.random.Generator) -> tuple[str, bytes]:
+    return list(files.items())[rng.integers(0, len(files))]
+
+
+def _pick(rng: np.random.Generator, *choices):
+    return choices[rng.integers(0, len(choices))]
+
+
+def _options(rng: np.random.Generator, *names: str) -> list[str]:
+    """Return one option, now and then, with an odd value."""
+    return [_pick(rng, *names), _pick(rng, *ODD)] if rng.random() < 0.12 else []
+
+
+def _with_stdin(name: str, data: bytes, args: list[str], rng: np.random.Generator) -> Request:
+    """Return a request whose file is named, or comes by standard input."""
+    piped = rng.random() < 0.2
+    return Request({name: data}, [args[0], "-" if piped else name, *args[1:]], name if piped else None)
