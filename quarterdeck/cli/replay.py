@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from quarterdeck.cli.output import console, digest
+from quarterdeck.cli.parameters import Real
 from quarterdeck.geo.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ SHOWN = 20  # differences that are printed; --json has all
 @click.argument("file")
 @click.option("--plan", help="The report's plan, where it does not lie where it lay.")
 @click.option("--site", help="The plan's site: it is planned again too, with its seed and parameters.")
-@click.option("--within", type=click.FloatRange(min=0), default=0.0, show_default=True,
+@click.option("--within", type=Real(min=0), default=0.0, show_default=True,
               help="Fraction by which numbers may differ, as between processors; 0: to the last digit.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Write all differences as JSON to standard output.")
 def command(file: str, plan: str | None, site: str | None, within: float, as_json: bool) -> int:

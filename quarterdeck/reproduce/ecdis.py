@@ -15,8 +15,6 @@ from typing import Any
 
 import click
 
-from quarterdeck.cli.parameters import Choice
-
 SITES = {"harbour": "dalian_harbour.geojson", "island": "west_ant_island.geojson"}
 
 TABLE_1 = {  # POC %, turns, length km
@@ -30,7 +28,7 @@ TABLE_2 = {5: (97.68, 839, 33.34, 91.70), 10: (97.63, 969, 33.33, 93.71), 20: (9
 
 
 @click.command(short_help="Coverage by several USVs beside an ECDIS: Tables I, II and the claim at delta = 10 m.")
-@click.option("--table", type=Choice(["1", "2", "delta", "all"]), default="all", show_default=True,
+@click.option("--table", type=click.Choice(["1", "2", "delta", "all"]), default="all", show_default=True,
               help="Table I, Table II, the claim that delta = 10 m covers 97 %, or all of them.")  # fmt: skip
 @click.option("--seeds", default=20, show_default=True, type=click.IntRange(min=1), help="Seeds 0 .. N-1 of Table I.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")

@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from quarterdeck.cli.parameters import Real
-
 if TYPE_CHECKING:
     from shapely import MultiPolygon
 
@@ -28,7 +26,7 @@ SIZES = (100, 200, 400, 800)
 
 @click.command(short_help="Limited visibility, any failures: figures, properties, theorems, complexities.")
 @click.argument("maps", nargs=-1, type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.option("--range", "reach", default=20.0, show_default=True, type=Real(min=0, min_open=True),
+@click.option("--range", "reach", default=20.0, show_default=True, type=click.FloatRange(min=0, min_open=True),
               help="Metres that a robot sees.")  # fmt: skip
 @click.option("--robots", default=3, show_default=True, type=click.IntRange(min=2, max=10), help="Robots; the first fails.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="A PNG file for the counterparts of Figs 1 to 5.")
