@@ -226,6 +226,9 @@ def _check_types(mission: Mission) -> None:
     for name, kind in PARAMETERS.items():
         if name in mission.parameters and not fits(mission.parameters[name], kind):
             raise TypeError(f"its parameter {name} is {str(mission.parameters[name])[:40]!r}")
+    known = {None, *(task.id for task in mission.tasks)}
+    if mission.method == "assign" and any(w.task not in known for r in mission.routes for w in r.waypoints):
+        raise ValueError("a route has a task that is not among its tasks")
     guards = [layer for layer in mission.layers if layer.name == "guards"]
     if mission.method == "guards" and len(guards) != 1:
         raise ValueError("its guards are missing")
