@@ -93,8 +93,11 @@ def shortest_paths(
             path = _with_ends(points[chain], sources[i], targets[j])
             paths[i][j] = path
             lengths[i, j] = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
-        keep = np.array([(min(u, v), max(u, v)) not in wrong for u, v in links.tolist()], dtype=bool)
-        links, weights, pending = links[keep], weights[keep], again
+        if wrong:
+            low, high = np.array(sorted(wrong)).T
+            keep = ~np.isin(links.min(axis=1) * len(points) + links.max(axis=1), low * len(points) + high)
+            links, weights = links[keep], weights[keep]
+        pending = again
     return lengths, paths
 
 

@@ -26,7 +26,9 @@ def seen_fraction(mission: Mission, tracks: Sequence[LineString]) -> float:
     """
     reach = float(mission.parameters["range"])
     space = space_of(Scenario(mission.name, mission.frame, mission.site, mission.vehicles))
-    places = [shapely.get_coordinates(shapely.segmentize(track, STRIDE * reach)) for track in tracks]
+    # GEOS cannot segmentize the line of who never moved.
+    ways = [track if track.length == 0 else shapely.segmentize(track, STRIDE * reach) for track in tracks]
+    places = [shapely.get_coordinates(way) for way in ways]
     if not places:
         return 0.0
     looks = np.unique(np.round(np.vstack(places), 3), axis=0)
