@@ -1,8 +1,8 @@
 """Random missions with random faults, recovered live in PyBullet: `python benchmarks/missions.py --cases 1000`.
 
-Each case (`random_missions.py`) is judged by what was driven, not by what the director believes: nobody touches anything, all that
-was planned is covered, seen or served but what the last plan tells of, everybody who works comes home with what the battery
-holds. A case that fails is told with the command that replays it: `python benchmarks/missions.py --seed N`.
+Each case (`random_missions.py`) is judged by what was driven, not by what the director believes: nobody touches anything,
+all that was planned is covered, seen or served but what the last plan tells of, all who work come home with what
+the battery holds. A case that fails is told with the command that replays it: `python benchmarks/missions.py --seed N`.
 """
 
 import argparse
@@ -137,7 +137,7 @@ def attempt(seed: int) -> dict[str, Any]:
         row |= {"replans": len(watched.plans), "told": list(watched.plans[-1][1].reasons) if watched.plans else []}
         row["wrong"] = judge(case, run, watched)
         row["simulated"] = round(float(run.trace.time[-1]), 1)
-    except Exception:  # noqa: BLE001 - whatever it is, it is what we look for
+    except Exception:  # whatever it is, it is what we look for
         row["wrong"] = [traceback.format_exc()]
     return row | {"seconds": round(time.process_time() - began, 2)}
 
