@@ -14,7 +14,10 @@ from typing import Any, Literal
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.files import write_file
+from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.check import trespasses, unsound
+from quarterdeck.mission.follow import follow
+from quarterdeck.mission.heights import knows_ground, too_high
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.sorties import sorties
 from quarterdeck.mission.timing import shortfalls
@@ -65,6 +68,8 @@ def export(
     autopilot: Autopilot = "ardupilot",
     altitude: Altitude = "relative",
     ground: float | None = None,
+    terrain: Terrain | None = None,
+    tolerance: float = 5.0,
     split: bool = False,
     force: bool = False,
     tell: Callable[[str], None] | None = None,
@@ -72,7 +77,9 @@ def export(
     """Write `mission` in each of the formats `to` (names of `FORMATS`) into the folder `out`; return the files' paths.
 
     Heights in autopilots' files count from home (`relative`), from the terrain that the autopilot knows (`terrain`,
-    ArduPilot only), or from mean sea level (`amsl`, with the `ground`'s metres above it). With `split` a mission beyond a
+    ArduPilot only), or from mean sea level (`amsl`, with the `ground`'s metres above it, or those of a plan made over
+    terrain). Over `terrain` what flies is held at its height within `tolerance` metres, as `plan` does. With `split` a
+    mission beyond a
     vehicle's endurance is written as sorties (`mission.sorties`), each round into a folder `sortie-1`, `sortie-2` and on.
     `tell` is called with one line for each limit that the mission meets in a format. Raises InputError, and writes nothing,
     for a plan that leaves the operating area or crosses a no-go zone, an unknown format, autopilot or altitude, two formats
@@ -83,18 +90,26 @@ def export(
         raise InputError(f"unknown autopilot {autopilot!r}; known: {', '.join(AUTOPILOTS)}")
     if altitude not in ALTITUDES:
         raise InputError(f"unknown altitude {altitude!r}; known: {', '.join(ALTITUDES)}")
-    if altitude == "amsl" and (ground is None or not math.isfinite(ground)):
-        raise InputError("altitudes above mean sea level need the ground's: give --ground METRES")
     if altitude == "terrain" and autopilot == "px4":
         raise InputError("PX4 takes no mission items above terrain; export relative or amsl altitudes")
     told: dict[str, None] = {}
-    settings = Settings(autopilot, lambda line: told.setdefault(line), altitude, ground or 0.0)
+    if terrain is not None:
+        mission = follow(mission, terrain, tolerance=tolerance)
+    elif "terrain" in mission.parameters and not knows_ground(mission):
+        raise InputError("the plan was made over terrain and has changed since; export it with --terrain FILE")
+    if ground is not None and knows_ground(mission):
+        raise InputError("the plan knows its ground from the terrain; leave out --ground")
     problems = unsound(mission) or trespasses(mission)
     if problems:
         more = f" (and {len(problems) - 1} more: `quarterdeck check` lists them)" if len(problems) > 1 else ""
         raise InputError(f"the plan must not leave like this: {problems[0]}{more}; plan it again")
+    if altitude == "amsl" and not knows_ground(mission) and (ground is None or not math.isfinite(ground)):
+        raise InputError("altitudes above mean sea level need the ground's: give --ground METRES, or --terrain FILE")
+    settings = Settings(autopilot, lambda line: told.setdefault(line), altitude, ground or 0.0)
+    for line in (*mission.figures.get("notes", ()), *too_high(mission)):
+        settings.tell(line)
     made: dict[str, bytes | str] = {}
-    for within, part in _parts(mission, split, settings):
+    for within, part in _parts(mission, split, settings, terrain, tolerance):
         for name in dict.fromkeys(names):
             module, options, _ = _format(name)
             exporter = import_module(f"quarterdeck.exporters.{module}")
@@ -102,18 +117,21 @@ def export(
                 if within + file in made:
                     raise InputError(f"{name} and another of the formats both write {file}; export them one by one")
                 made[within + file] = content
-    if tell is not None:
-        for line in told:
-            tell(line)
     folder = Path(out)
     paths = [folder / file for file in made]
     standing = [path for path in paths if path.exists()]
     if standing and not force:
         raise InputError(f"{standing[0]} exists; give --force to overwrite it, or another folder with -o")
-    return [write_file(path, content, force=force) for path, content in zip(paths, made.values(), strict=True)]
+    written = [write_file(path, content, force=force) for path, content in zip(paths, made.values(), strict=True)]
+    if tell is not None:  # only now, for a refusal is the only thing said
+        for line in told:
+            tell(line)
+    return written
 
 
-def _parts(mission: Mission, split: bool, settings: Settings) -> list[tuple[str, Mission]]:
+def _parts(
+    mission: Mission, split: bool, settings: Settings, terrain: Terrain | None, tolerance: float
+) -> list[tuple[str, Mission]]:
     """The missions to write and the folder of each: the mission itself, or its rounds of sorties."""
     short = [line for route in mission.routes for line in shortfalls(mission.vehicle(route.vehicle), route)]
     if not short:
@@ -121,8 +139,12 @@ def _parts(mission: Mission, split: bool, settings: Settings) -> list[tuple[str,
     if not split:
         settings.tell(f"{short[0]}; export with --sorties to have it split")
         return [("", mission)]
+    if terrain is None and knows_ground(mission):
+        raise InputError("sorties of a plan over terrain have new ways home; export them with --terrain FILE")
     rounds = sorties(mission)
     away = [replace(m, routes=tuple(r for r in m.routes if len(r.waypoints) > 1)) for m in rounds]
+    if terrain is not None:
+        away = [follow(part, terrain, tolerance=tolerance) for part in away]
     return [(f"sortie-{number}/", part) for number, part in enumerate(away, 1)]
 
 

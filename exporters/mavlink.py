@@ -44,7 +44,7 @@ def mission_items(mission: Mission, route: Route, settings: Settings) -> list[It
     neither, for Rover accepts a take-off and then skips it. The camera is triggered by distance on the survey legs only.
     """
     vehicle, autopilot = mission.vehicle(route.vehicle), settings.autopilot
-    frame, sea = FRAMES[settings.altitude], settings.ground if settings.altitude == "amsl" else 0.0
+    frame, heights = FRAMES[settings.altitude], item_heights(route, settings)
     places = mission.frame.to_degrees(route.xyz[:, :2])
     headings = compass(route.xyz[:, :2])
     trigger = trigger_distance(vehicle)
@@ -56,13 +56,15 @@ def mission_items(mission: Mission, route: Route, settings: Settings) -> list[It
         lon, lat = places[0]
         yaw = _yaw(headings[0], autopilot)
         before = route.waypoints[path.start - 1]
-        height = before.z if before.leg == "takeoff" else route.waypoints[path.start].z
-        items.append(Item(TAKEOFF, frame, (0.0, 0.0, 0.0, yaw), lat, lon, round(height + sea, 3)))
+        height = heights[path.start - 1 if before.leg == "takeoff" else path.start]
+        items.append(Item(TAKEOFF, frame, (0.0, 0.0, 0.0, yaw), lat, lon, height))
     speed, shooting = 0.0, False
     for i in path:
         waypoint = route.waypoints[i]
-        if waypoint.speed > 0 and abs(waypoint.speed - speed) > 0.005:
-            speed = waypoint.speed
+        flat = math.dist(route.xyz[i, :2], route.xyz[i - 1, :2])  # what autopilots are told is the speed over ground
+        along = waypoint.speed * flat / (math.hypot(flat, waypoint.z - route.waypoints[i - 1].z) or 1.0)
+        if along > 0 and abs(along - speed) > 0.005:
+            speed = along
             items.append(Item(CHANGE_SPEED, MISSION_FRAME, (1.0, round(speed, 3), -1.0, 0.0)))
         if trigger is not None and (waypoint.leg == "survey") != shooting:
             shooting = not shooting
@@ -72,7 +74,7 @@ def mission_items(mission: Mission, route: Route, settings: Settings) -> list[It
         hold = float(math.ceil(waypoint.hold - 1e-9))  # ArduPilot keeps whole seconds
         lon, lat = places[i]
         free = (hold, accept, 0.0, _yaw(headings[i], autopilot))
-        items.append(Item(WAYPOINT, frame, free, lat, lon, round(waypoint.z + sea, 3)))
+        items.append(Item(WAYPOINT, frame, free, lat, lon, heights[i]))
     if shooting:
         items.append(_trigger(0.0))
     if flies and path:
@@ -80,8 +82,29 @@ def mission_items(mission: Mission, route: Route, settings: Settings) -> list[It
             items.append(Item(RETURN, MISSION_FRAME))
         else:
             lon, lat = places[-1]
-            items.append(Item(LAND, frame, (0.0, 0.0, 0.0, _yaw(headings[-1], autopilot)), lat, lon, sea))
+            items.append(Item(LAND, frame, (0.0, 0.0, 0.0, _yaw(headings[-1], autopilot)), lat, lon, heights[-1]))
     return items
+
+
+def item_heights(route: Route, settings: Settings) -> list[float]:
+    """Return the altitude of each waypoint's item in metres: above home, above the terrain, or above mean sea level.
+
+    Where the plan knows the ground it is one place in all three. Else the ground is taken to be level with home.
+    """
+    home = home_ground(route, settings)
+    datum = {"relative": home, "amsl": 0.0}
+    return [
+        round(w.z + (home if w.ground is None else w.ground) - datum[settings.altitude], 3)
+        if settings.altitude in datum
+        else round(w.z, 3)
+        for w in route.waypoints
+    ]
+
+
+def home_ground(route: Route, settings: Settings) -> float:
+    """Return metres of the ground at home above mean sea level, as the plan knows it or the user says."""
+    known = route.waypoints[0].ground if route.waypoints else None
+    return settings.ground if known is None else round(known, 3)
 
 
 def tell_limits(mission: Mission, settings: Settings) -> None:

@@ -12,7 +12,7 @@ from shapely import Polygon
 
 from quarterdeck.exporters.export import Settings
 from quarterdeck.exporters.fence import fence_polygons
-from quarterdeck.exporters.mavlink import FRAMES, GLOBAL, RELATIVE, TERRAIN, Item, mission_items, tell_limits
+from quarterdeck.exporters.mavlink import FRAMES, GLOBAL, RELATIVE, TERRAIN, Item, home_ground, mission_items, tell_limits
 from quarterdeck.exporters.places import degrees, file_stems
 from quarterdeck.geo.frame import Frame
 from quarterdeck.mission.mission import Mission, Route
@@ -48,7 +48,7 @@ def _plan(mission: Mission, route: Route, settings: Settings) -> dict[str, Any]:
             "globalPlanAltitudeMode": MODES[FRAMES[settings.altitude]],
             "cruiseSpeed": vehicle.speed,
             "hoverSpeed": vehicle.speed,
-            "plannedHomePosition": [lat, lon, settings.ground],
+            "plannedHomePosition": [lat, lon, home_ground(route, settings)],
             "items": [_item(item, number) for number, item in enumerate(items, 1)],
         },
         "geoFence": {

@@ -9,7 +9,16 @@ from shapely import Polygon
 
 from quarterdeck.exporters.export import Settings
 from quarterdeck.exporters.fence import fence_polygons
-from quarterdeck.exporters.mavlink import GLOBAL, MOST_ITEMS, RELATIVE, WAYPOINT, Item, mission_items, tell_limits
+from quarterdeck.exporters.mavlink import (
+    GLOBAL,
+    MOST_ITEMS,
+    RELATIVE,
+    WAYPOINT,
+    Item,
+    home_ground,
+    mission_items,
+    tell_limits,
+)
 from quarterdeck.exporters.places import file_stems
 from quarterdeck.mission.mission import Mission
 
@@ -24,7 +33,7 @@ def files(mission: Mission, settings: Settings) -> dict[str, str]:
     for route in mission.routes:
         stem = stems[route.vehicle]
         lon, lat = mission.frame.to_degrees(route.xyz[:1, :2])[0]
-        home = Item(WAYPOINT, GLOBAL, lat=lat, lon=lon, z=settings.ground)
+        home = Item(WAYPOINT, GLOBAL, lat=lat, lon=lon, z=home_ground(route, settings))
         items = mission_items(mission, route, settings)
         if len(items) + 1 > MOST_ITEMS[settings.autopilot]:
             settings.tell(

@@ -21,9 +21,9 @@ DEFAULT_MODEL = {"surface": "otter", "ground": "husky", "aerial": "survey-quad"}
 @dataclass(frozen=True, slots=True)
 class VehicleModel:
     """What is true of every vehicle of a kind: `length`, `width` m; `speed` cruise and `max_speed` m/s; `turn_radius` m
-    at cruise (0: turns on the spot); `turn_rate` rad/s when it turns on the spot; `acceleration` m/s2; `climb_rate` m/s;
-    `clearance` m kept from obstacles; `battery` Wh; `power_idle` W at rest or hovering; `power_cruise` W at cruise;
-    `file` is the path it was read from, none for a packaged model.
+    at cruise (0: turns on the spot); `turn_rate` rad/s when it turns on the spot; `acceleration` m/s2; `climb_rate` and
+    `descent_rate` m/s (0: descends as it climbs); `clearance` m kept from obstacles; `battery` Wh; `power_idle` W at rest
+    or hovering; `power_cruise` W at cruise; `file` is the path it was read from, none for a packaged model.
     """
 
     name: str
@@ -42,13 +42,14 @@ class VehicleModel:
     power_cruise: float
     power_exponent: float
     climb_rate: float = 0.0
+    descent_rate: float = 0.0
     altitude: float = 0.0
     dynamics: Mapping[str, Any] = field(default_factory=dict, hash=False)
     file: str = ""
 
     def __post_init__(self) -> None:
         """Raise InputError for figures that no vehicle has."""
-        for key in (*_LIMITS, *_ENERGY, "climb_rate", "altitude"):
+        for key in (*_LIMITS, *_ENERGY, *_OPTIONAL):
             value = getattr(self, key)
             if not 0 <= value < 1e9 or (value == 0 and key not in _MAY_BE_ZERO):
                 raise InputError(f"{key} = {value:g} must be positive and below 1e9")
@@ -56,6 +57,11 @@ class VehicleModel:
             raise InputError(f"speed {self.speed:g} exceeds max_speed {self.max_speed:g}")
         if self.domain == "aerial" and not self.climb_rate:
             raise InputError("climb_rate of an aerial vehicle must be a number above 0, m/s")
+
+    @property
+    def sink_rate(self) -> float:
+        """Metres per second that it descends."""
+        return self.descent_rate or self.climb_rate
 
     def power(self, speed: float) -> float:
         """Return watts drawn at `speed` m/s: idle plus a power law through the cruise figure."""
@@ -93,8 +99,9 @@ def load_model(name: str) -> VehicleModel:
 
 
 _LIMITS = ("length", "width", "speed", "max_speed", "turn_radius", "turn_rate", "acceleration", "clearance")
+_OPTIONAL = ("climb_rate", "descent_rate", "altitude")
 _ENERGY = ("battery", "power_idle", "power_cruise", "power_exponent")
-_MAY_BE_ZERO = ("turn_radius", "clearance", "power_idle", "power_exponent", "climb_rate", "altitude")
+_MAY_BE_ZERO = ("turn_radius", "clearance", "power_idle", "power_exponent", "climb_rate", "descent_rate", "altitude")
 
 
 def _model(document: dict[str, Any], file: str) -> VehicleModel:
@@ -107,13 +114,13 @@ def _model(document: dict[str, Any], file: str) -> VehicleModel:
         if not isinstance(document.get(table), dict):
             raise InputError(f"table [{table}] is missing")
     limits, energy = document["limits"], document["energy"]
-    for table, known in (("limits", (*_LIMITS, "climb_rate", "altitude")), ("energy", _ENERGY)):
+    for table, known in (("limits", (*_LIMITS, *_OPTIONAL)), ("energy", _ENERGY)):
         for key in document[table]:
             if key not in known:
                 near = get_close_matches(key, known, n=1)
                 raise InputError(f"[{table}] has no {key!r}; {f'did you mean {near[0]!r}?' if near else ', '.join(known)}")
     figures = {key: _number(limits, "limits", key) for key in _LIMITS}
-    figures |= {key: _number(limits, "limits", key) for key in ("climb_rate", "altitude") if key in limits}
+    figures |= {key: _number(limits, "limits", key) for key in _OPTIONAL if key in limits}
     figures |= {key: _number(energy, "energy", key) for key in _ENERGY}
     return VehicleModel(
         name=document["name"],

@@ -76,6 +76,10 @@ PROPERTIES: dict[str, dict[str, Property]] = {
         "endurance": _number("a number above 0", "seconds it can be out; default unlimited", **_POSITIVE),
         "battery": _number("a number above 0", "watt-hours; default the model's", **_POSITIVE),
         "altitude": _number("a number above 0", "metres above ground, aerial only; default the model's", **_POSITIVE),
+        "ceiling": _number(
+            "a number above 0", "metres above ground that it stays below, aerial only; default 120", **_POSITIVE
+        ),
+        "ceiling_amsl": _number("a number above 0", "metres above mean sea level likewise; default none", **_POSITIVE),
         "end": Property(
             {"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 3},
             "a position [lon, lat]",

@@ -17,6 +17,7 @@ from quarterdeck.geo.geojson import parse, position_problem, positions, read_cor
 from quarterdeck.geo.models import DEFAULT_MODEL, load_model
 from quarterdeck.geo.properties import GEOMETRIES, LINES, property_problems
 from quarterdeck.geo.scenario import (
+    CEILING,
     DOMAINS,
     Area,
     Casualty,
@@ -286,6 +287,8 @@ def _vehicle(feature: dict[str, Any], frame: Frame, problems: list[str]) -> Vehi
         range=given.get("range"),
         can=frozenset(given.get("can", ())),
         returns=given.get("returns", True),
+        ceiling=float(given.get("ceiling", CEILING)),
+        ceiling_amsl=float(given.get("ceiling_amsl", float("inf"))),
     )
 
 

@@ -13,6 +13,7 @@ from quarterdeck.geo.models import VehicleModel
 
 Domain = Literal["surface", "ground", "aerial"]
 DOMAINS: tuple[Domain, ...] = ("surface", "ground", "aerial")
+CEILING = 120.0  # m above ground: EU 2019/947, UAS.OPEN.010; 14 CFR 107.51 allows 400 feet, 121.9 m
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +81,8 @@ class Vehicle:
     `start` and `end` are (x, y) metres; `end` None means back to `start`; where it does not return it stays where its
     last track ends. `share` is the part of the area it covers, None
     where shares are to follow from speeds. `speed` m/s, `turn_radius`, `clearance` and `range` (how far it sees) metres,
-    `endurance` seconds, `battery` watt-hours, `altitude` metres above ground (aerial only), `can` its capabilities.
+    `endurance` seconds, `battery` watt-hours, `altitude` metres above ground (aerial only); all of its flight stays
+    below `ceiling` metres above ground and `ceiling_amsl` above mean sea level; `can` its capabilities.
     """
 
     id: str
@@ -98,6 +100,8 @@ class Vehicle:
     range: float | None = None
     can: frozenset[str] = frozenset()
     returns: bool = True
+    ceiling: float = CEILING
+    ceiling_amsl: float = float("inf")
 
     @property
     def domain(self) -> Domain:

@@ -43,6 +43,9 @@ def _vehicle(frame: Frame, vehicle: Vehicle) -> dict[str, Any]:
     given["battery"] = min(vehicle.battery, UNLIMITED)
     if vehicle.altitude > 0:
         given["altitude"] = vehicle.altitude
+    if vehicle.domain == "aerial":
+        given["ceiling"] = vehicle.ceiling
+        given |= {"ceiling_amsl": vehicle.ceiling_amsl} if vehicle.ceiling_amsl < math.inf else {}
     if vehicle.end is not None:
         given["end"] = position(frame, vehicle.end)
     if vehicle.sensor is not None:

@@ -13,6 +13,7 @@ from shapely.ops import unary_union
 
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.guard_check import unproved
+from quarterdeck.mission.heights import too_high, too_steep
 from quarterdeck.mission.mission import Mission, Route, Waypoint
 from quarterdeck.mission.timing import shortfalls
 
@@ -23,8 +24,8 @@ def check_mission(mission: Mission) -> tuple[str, ...]:
     """Return every problem found, a line each: none means that the plan can be driven as it is.
 
     Checked are: numbers and order of times; staying in the operating area; clear of obstacles by each vehicle's clearance
-    (its berth apart); survey legs in the areas; vehicles apart in time; energy and endurance with the reserve; a guards
-    plan's coverage, by another way than it was planned; and what the planner itself found.
+    (its berth apart); survey legs in the areas; vehicles apart in time; energy and endurance with the reserve; ceilings and
+    rates of climb; a guards plan's coverage, by another way than it was planned; and what the planner itself found.
     """
     broken = unsound(mission)
     if broken:
@@ -32,7 +33,7 @@ def check_mission(mission: Mission) -> tuple[str, ...]:
     problems = [*mission.reasons, *trespasses(mission), *_too_near(mission), *_astray(mission), *_meetings(mission)]
     for route in mission.routes:
         problems += shortfalls(mission.vehicle(route.vehicle), route)
-    problems += unproved(mission)
+    problems += [*too_high(mission), *too_steep(mission), *unproved(mission)]
     return tuple(dict.fromkeys(problems))
 
 
@@ -40,7 +41,7 @@ def unsound(mission: Mission) -> tuple[str, ...]:
     """Return what no later step could make sense of: no such vehicle, numbers that are not finite, times that run back."""
     problems = []
     known = {v.id for v in mission.vehicles}
-    numbers = [f.name for f in fields(Waypoint) if f.name not in ("leg", "task")]
+    numbers = [f.name for f in fields(Waypoint) if f.name not in ("leg", "task", "ground")]
     for route in mission.routes:
         if route.vehicle not in known:
             problems.append(f"route of {route.vehicle!r}: there is no such vehicle")
@@ -53,6 +54,9 @@ def unsound(mission: Mission) -> tuple[str, ...]:
         if len(bad):
             row, column = bad[0]
             problems.append(f"{route.vehicle}: waypoint {row}: {numbers[column]} is {table[row, column]}, not a number")
+            continue
+        if not np.isfinite([w.ground for w in route.waypoints if w.ground is not None]).all():
+            problems.append(f"{route.vehicle}: the ground beneath a waypoint is not a number")
             continue
         times, holds = table[:, numbers.index("time")], table[:, numbers.index("hold")]
         back = np.flatnonzero(np.diff(times) < holds[:-1] - 0.01)

@@ -18,6 +18,7 @@ class Waypoint:
 
     `leg` is the kind of the leg that ENDS here (the first waypoint of a route is `start`), `speed` the speed on it in m/s.
     `hold` is seconds waited here, `time` seconds since the mission's start at arrival, `task` the id of what is done here.
+    `ground` is the metres of the ground beneath above mean sea level, None where no terrain was given.
     """
 
     x: float
@@ -28,6 +29,7 @@ class Waypoint:
     hold: float = 0.0
     time: float = 0.0
     task: str | None = None
+    ground: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,7 +37,7 @@ PARAMETERS: dict[str, Any] = {  # those that later steps read
 }
 GUARD = {"guard": int, "turn": int | None, "vehicle": str | None, "range": float, "seen": bool}
 LEGS = set(get_args(Leg))
-LISTS = ("leg", "speed", "hold", "time", "task")  # of a route's waypoints, in the order of its positions
+LISTS = ("leg", "speed", "hold", "time", "task", "ground")  # of a route's waypoints, in the order of its positions
 
 
 def plan_text(mission: Mission) -> str:
@@ -95,6 +95,7 @@ def _fleet(mission: Mission) -> list[dict[str, Any]]:
     features = []
     for v, colour in zip(mission.vehicles, colours(len(mission.vehicles)), strict=True):
         given: dict[str, Any] = {"model": _plain(asdict(v.model))} | {n: getattr(v, n) for n in VEHICLE_FIGURES}
+        given |= {"ceiling": v.ceiling, "ceiling_amsl": v.ceiling_amsl} if v.domain == "aerial" else {}
         given |= {"sensor": asdict(v.sensor) if v.sensor else None, "can": sorted(v.can), "returns": v.returns}
         given |= {"end": position(frame, v.end) if v.end else None, "marker-color": colour}
         features.append(point_feature(frame, "vehicle", v.start, v.id, **_plain(given)))
@@ -128,8 +129,10 @@ def _routes(mission: Mission) -> list[dict[str, Any]]:
         lists = {name: [getattr(w, name) for w in route.waypoints] for name in LISTS}
         lists["time"] = [round(t, 3) for t in lists["time"]]
         lists["speed"] = [round(s, 4) for s in lists["speed"]]
-        if not any(lists["task"]):
-            del lists["task"]
+        lists["ground"] = [None if g is None else round(g, 3) for g in lists["ground"]]
+        for name in ("task", "ground"):
+            if all(value is None for value in lists[name]):
+                del lists[name]
         figures = {"energy": route.energy, "length": round(route.length, 2), "duration": round(route.duration, 2)}
         look: dict[str, Any] = {"stroke": colour, "stroke-width": 2}
         drawn = {"type": "LineString", "coordinates": line if len(line) > 1 else line * 2}
@@ -226,6 +229,8 @@ def _check_types(mission: Mission) -> None:
     for name, kind in PARAMETERS.items():
         if name in mission.parameters and not fits(mission.parameters[name], kind):
             raise TypeError(f"its parameter {name} is {str(mission.parameters[name])[:40]!r}")
+    if not fits(tuple(mission.figures.get("notes", ())), tuple[str, ...]):
+        raise TypeError("its notes are no texts")
     known = {None, *(task.id for task in mission.tasks)}
     if mission.method == "assign" and any(w.task not in known for r in mission.routes for w in r.waypoints):
         raise ValueError("a route has a task that is not among its tasks")
@@ -283,6 +288,9 @@ def _vehicle(feature: dict[str, Any], frame: Frame) -> Vehicle:
     figures: dict[str, Any] = {n: None if given[n] is None else float(given[n]) for n in VEHICLE_FIGURES}
     for unlimited in ("endurance", "battery"):
         figures[unlimited] = math.inf if figures[unlimited] is None else figures[unlimited]
+    for ceiling in ("ceiling", "ceiling_amsl"):
+        if given.get(ceiling) is not None:  # plans of before there were any have none
+            figures[ceiling] = float(given[ceiling])
     return Vehicle(
         id=feature["id"],
         model=VehicleModel(**given["model"]),
@@ -311,10 +319,11 @@ def _route(feature: dict[str, Any], frame: Frame) -> Route:
     columns = [given.get(name) or [None] * len(line) for name in LISTS]
     if any(len(c) != len(line) for c in columns):
         raise ValueError(f"route of {given['vehicle']}: lists of different lengths")
-    if not set(columns[0]) <= LEGS or not all(task is None or isinstance(task, str) for task in columns[-1]):
+    if not set(columns[0]) <= LEGS or not all(task is None or isinstance(task, str) for task in columns[4]):
         raise ValueError(f"route of {given['vehicle']}: a leg or a task is unknown")
+    columns[5] = [None if ground is None else float(ground) for ground in columns[5]]
     waypoints = tuple(
-        Waypoint(float(x), float(y), float(h), leg, float(speed), float(hold), float(time), task)
-        for (x, y), h, leg, speed, hold, time, task in zip(xy, z, *columns, strict=True)
+        Waypoint(float(x), float(y), float(h), leg, float(speed), float(hold), float(time), task, ground)
+        for (x, y), h, leg, speed, hold, time, task, ground in zip(xy, z, *columns, strict=True)
     )
     return Route(given["vehicle"], waypoints, float(given["energy"]))

@@ -14,7 +14,7 @@ from quarterdeck.mission.mission import Leg, Route, unbroken
 from quarterdeck.mission.timing import shortfalls, timed_route
 
 PIVOT = np.pi  # radians: a turn on the spot, at the most
-LAYER_STEP = 5.0  # m between the altitudes at which aerial vehicles transit
+LAYER_STEP = 5.0  # m between the altitudes at which aerial vehicles transit, less where a ceiling is near
 
 
 def survey_routes(
@@ -71,7 +71,7 @@ def way_routes(
         holds = np.where(path.stops, PIVOT / vehicle.model.turn_rate, 0.0)
         if vehicle.domain == "aerial" and len(xyz) > 1:
             survey = np.array([leg == "survey" for leg in kinds])
-            xyz[:, 2] = np.where(survey, vehicle.altitude, vehicle.altitude + (i + 1) * LAYER_STEP)
+            xyz[:, 2] = np.where(survey, vehicle.altitude, _transit_height(vehicles, i))
             xyz, kinds, kept = _with_takeoff(xyz, kinds)
             pace, holds = np.where(kept < 0, 1.0, pace[kept]), np.where(kept < 0, 0.0, holds[kept])
         holds[0] = _launch_delay(vehicles, i)
@@ -106,6 +106,14 @@ def _linked(vehicle: Vehicle, lines: Sequence[np.ndarray], road: Roadmap) -> tup
 def survey_tracks(vehicle: Vehicle, route: Route) -> list[np.ndarray]:
     """Return the (n, 2) lines in metres along which a route surveys, corners rounded as the vehicle drives them."""
     return [driven(line, vehicle.turn_radius) for line in unbroken(route.xyz[:, :2], route.survey)]
+
+
+def _transit_height(vehicles: Sequence[Vehicle], index: int) -> float:
+    """Return metres above ground of a vehicle's transits: each has its own layer above its altitude, below its ceiling."""
+    flying = [v for v in vehicles if v.domain == "aerial"]
+    own = vehicles[index]
+    step = min([LAYER_STEP, *((v.ceiling - v.altitude) / len(flying) for v in flying if v.ceiling > v.altitude)])
+    return own.altitude + (flying.index(own) + 1) * step
 
 
 def _launch_delay(vehicles: Sequence[Vehicle], index: int) -> float:

@@ -23,7 +23,7 @@ def timed_route(
     """Return the route along (n, 3) `points` in metres, its times and energy filled in.
 
     `legs[i]` is the kind of the leg that ends at point i, `holds[i]` the seconds waited there, `tasks[i]` what is done.
-    A leg takes its length at the vehicle's speed, or its climb at the climb rate where that is longer, plus the turn
+    A leg takes its length at the vehicle's speed, or its climb or descent at its rate where that is longer, plus the turn
     before it (`turn_time`).
     """
     points = np.asarray(points, dtype=float).reshape(-1, 3)
@@ -36,9 +36,10 @@ def timed_route(
         speed = 0.0
         if i:
             flat = math.hypot(x - points[i - 1, 0], y - points[i - 1, 1])
-            climb = abs(z - points[i - 1, 2])
+            climb = z - points[i - 1, 2]
+            rate = vehicle.model.climb_rate if climb > 0 else vehicle.model.sink_rate
             pace_here = 1.0 if pace is None else float(pace[i])
-            seconds = max(flat / (pace_here * vehicle.speed), climb / vehicle.model.climb_rate if climb else 0.0)
+            seconds = max(flat / (pace_here * vehicle.speed), abs(climb) / rate if climb else 0.0)
             speed = math.hypot(flat, climb) / seconds if seconds else vehicle.speed
             energy += vehicle.model.power(pace_here * vehicle.speed if flat else 0.0) * (seconds + turns[i - 1])
             time += seconds + turns[i - 1]

@@ -172,8 +172,9 @@ def guide_multirotors(
             gap = np.sqrt((reference[i, 0] - position[i, 0]) ** 2 + (reference[i, 1] - position[i, 1]) ** 2
                           + (reference[i, 2] - position[i, 2]) ** 2)  # fmt: skip
             wanted = min(b.speed, t.slow) * min(max(2.0 - gap / 2.0, 0.0), 1.0)
-            if length > 0 and abs(dz) / length * wanted > lim.climb:
-                wanted = lim.climb * length / abs(dz)
+            rate = lim.climb if dz > 0 else lim.sink
+            if length > 0 and abs(dz) / length * wanted > rate:
+                wanted = rate * length / abs(dz)
             leave = 0.0 if _stops(t, table, time) else _corner_speed(t, table, lim.accel)
             wanted = min(wanted, np.sqrt(leave**2 + 2 * 0.7 * lim.accel * max(length - t.reach, 0.0)))
             t.pace = min(max(wanted, t.pace - lim.accel * step), t.pace + 0.7 * lim.accel * step)

@@ -29,7 +29,9 @@ TRACK = np.dtype(
     + [("turning", np.bool_)]
 )
 
-LIMITS = np.dtype([(n, float) for n in ("length", "speed", "max_speed", "radius", "rate", "accel", "climb", "zone")])
+LIMITS = np.dtype(
+    [(n, float) for n in ("length", "speed", "max_speed", "radius", "rate", "accel", "climb", "sink", "zone")]
+)
 
 
 def vehicle_limits(vehicles: Sequence[Vehicle]) -> np.ndarray:
@@ -43,6 +45,7 @@ def vehicle_limits(vehicles: Sequence[Vehicle]) -> np.ndarray:
             v.model.turn_rate,
             v.model.acceleration,
             v.model.climb_rate,
+            v.model.sink_rate,
             max(3 * v.turn_radius, 2 * v.speed),
         )
         for v in vehicles

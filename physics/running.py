@@ -9,6 +9,7 @@ import shapely
 from shapely import LineString, MultiPolygon
 
 from quarterdeck.geo.scenario import Site
+from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.director import Command, Director, Event, State
 from quarterdeck.mission.mission import Mission, Waypoint
 from quarterdeck.physics.faults import Fault, active, next_change
@@ -16,7 +17,7 @@ from quarterdeck.physics.fleet import Rovers, Squad, form_squads
 from quarterdeck.physics.rover import climb_parameters
 from quarterdeck.physics.sensing import Legs, Senses, Sensing
 from quarterdeck.physics.separation import give_way
-from quarterdeck.physics.terrain import Terrain, stand, steepness
+from quarterdeck.physics.terrain import stand, steepness
 from quarterdeck.physics.trace import TraceBuilder
 from quarterdeck.physics.wind import MEMORY, step_gusts
 from quarterdeck.physics.world import GAP, HEIGHT, INCONSISTENT, World

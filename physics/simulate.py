@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.director import Director
 from quarterdeck.mission.inspection import default_director
 from quarterdeck.mission.mission import Mission
@@ -14,7 +15,7 @@ from quarterdeck.physics.faults import read_faults
 from quarterdeck.physics.report import Report, measure
 from quarterdeck.physics.running import DECIDE, Running
 from quarterdeck.physics.sensing import Sensing
-from quarterdeck.physics.terrain import Terrain, check_terrain
+from quarterdeck.physics.terrain import check_terrain
 from quarterdeck.physics.trace import Trace, TraceBuilder
 from quarterdeck.physics.world import open_world
 

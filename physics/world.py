@@ -17,7 +17,7 @@ from shapely import Polygon
 
 from quarterdeck.geo.errors import InputError, UnavailableError
 from quarterdeck.geo.scenario import Obstacle, Vehicle
-from quarterdeck.physics.terrain import Terrain
+from quarterdeck.geo.terrain import Terrain
 
 HEIGHT = {"surface": 1.0, "ground": 0.6, "aerial": 0.2}  # m, of a vehicle's body
 BIT = {"surface": 2, "ground": 4, "aerial": 8}  # collision groups; obstacles are 1

@@ -4,12 +4,14 @@ Each stage is imported when it is first called, so that importing the package co
 """
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.reader import read_scenario
 from quarterdeck.geo.scenario import Scenario
+from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.planfile import plan_text, read_plan
 
@@ -19,12 +21,21 @@ __all__ = ["assign", "export", "plan", "plan_text", "read_plan", "read_scenario"
 Method = Literal["stc", "lines", "guards"]
 
 
-def plan(scenario: Scenario, *, method: Method | None = None, seed: int = 0, **options: Any) -> Mission:
+def plan(
+    scenario: Scenario,
+    *,
+    method: Method | None = None,
+    seed: int = 0,
+    terrain: Terrain | None = None,
+    tolerance: float = 5.0,
+    **options: Any,
+) -> Mission:
     """Return a mission that covers the scenario's areas.
 
     `stc` divides a placed grid and walks spanning trees (`quarterdeck.mission.cover.cover`), `lines` surveys by parallel
     lines (`quarterdeck.mission.lines.plan_lines`), `guards` sees every point from within a limited range
     (`quarterdeck.mission.guards.plan_guards`); `options` are theirs. None: lines where a vehicle has a sensor, else stc.
+    Over `terrain` what flies holds its height above ground within `tolerance` metres (`quarterdeck.mission.follow.follow`).
     Raises InputError if the scenario cannot be planned as it is.
     """
     method = method or default_method(scenario)
@@ -33,14 +44,26 @@ def plan(scenario: Scenario, *, method: Method | None = None, seed: int = 0, **o
     if method == "guards":
         from quarterdeck.mission.guards import plan_guards
 
-        return plan_guards(scenario, seed=seed, **options)
-    if method == "lines":
+        mission = plan_guards(scenario, seed=seed, **options)
+    elif method == "lines":
         from quarterdeck.mission.lines import plan_lines
 
-        return plan_lines(scenario, seed=seed, **options)
-    from quarterdeck.mission.cover import cover
+        mission = plan_lines(scenario, seed=seed, **options)
+    else:
+        from quarterdeck.mission.cover import cover
 
-    return cover(scenario, seed=seed, **options)
+        mission = cover(scenario, seed=seed, **options)
+    return _at_height(mission, terrain, tolerance)
+
+
+def _at_height(mission: Mission, terrain: Terrain | None = None, tolerance: float = 5.0) -> Mission:
+    """Return the mission over the terrain, if there is one, its ceilings looked at."""
+    from quarterdeck.mission.follow import follow
+    from quarterdeck.mission.heights import too_high
+
+    if terrain is not None:
+        mission = follow(mission, terrain, tolerance=tolerance)
+    return replace(mission, reasons=tuple(dict.fromkeys([*mission.reasons, *too_high(mission)])))
 
 
 def default_method(scenario: Scenario) -> Method:
@@ -52,7 +75,7 @@ def assign(scenario: Scenario, *, seed: int = 0, **options: Any) -> Mission:
     """Return a mission in which the scenario's vehicles do its tasks (`quarterdeck.mission.assign.assign`)."""
     from quarterdeck.mission.assign import assign as share_out
 
-    return share_out(scenario, seed=seed, **options)
+    return _at_height(share_out(scenario, seed=seed, **options))
 
 
 def simulate(mission: Mission, **options: Any) -> Any:

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from quarterdeck.cli.output import force_option
+from quarterdeck.cli.output import force_option, terrain_option, tolerance_option
 from quarterdeck.cli.parameters import Real
 
 
@@ -16,10 +16,19 @@ from quarterdeck.cli.parameters import Real
 @click.option("--autopilot", default="ardupilot", show_default=True, help="Whom mission files are for: ardupilot or px4.")
 @click.option("--altitude", default="relative", show_default=True, help="What heights count from: relative, terrain, amsl.")
 @click.option("--ground", type=Real(), help="Metres of the ground above mean sea level, for amsl.")
+@terrain_option
+@tolerance_option
 @click.option("--sorties", is_flag=True, help="Split what is beyond a vehicle's endurance into sorties, a folder each.")
 @force_option
 def command(
-    plan: str, formats: str, out: str, autopilot: str, altitude: str, ground: float | None, sorties: bool, force: bool
+    plan: str,
+    formats: str,
+    out: str,
+    terrain: str | None,
+    tolerance: float,
+    sorties: bool,
+    force: bool,
+    **options: Any,
 ) -> None:
     """Write PLAN (a file, or - for standard input) in other formats; print the paths of the files, one a line.
 
@@ -30,8 +39,11 @@ def command(
 
     names = list(FORMATS) if formats == "all" else [name.strip() for name in formats.split(",") if name.strip()]
     mission = read_plan(plan)
-    options: dict[str, Any] = {"autopilot": autopilot, "altitude": altitude, "ground": ground}
-    for path in export(mission, names, Path(out), **options, split=sorties, force=force, tell=_note):
+    if terrain:
+        from quarterdeck.geo.terrain import read_terrain
+
+        options["terrain"] = read_terrain(terrain, mission.frame, mission.site.operating.bounds)
+    for path in export(mission, names, Path(out), **options, tolerance=tolerance, split=sorties, force=force, tell=_note):
         click.echo(path)
 
 

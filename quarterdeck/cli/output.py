@@ -32,6 +32,11 @@ output_option = click.option(
     help="The file to write; - is standard output.",
 )
 force_option = click.option("--force", is_flag=True, is_eager=True, help="Overwrite existing files.")
+terrain_option = click.option(
+    "--terrain", metavar="FILE", help="Elevation model (GeoTIFF, ESRI ASCII grid): what flies holds its height above it."
+)
+tolerance_option = click.option("--tolerance", type=click.FloatRange(min=0, min_open=True), default=5.0, show_default=True,
+                                help="With --terrain: metres above or below that height between waypoints.")  # fmt: skip
 seed_option = click.option(
     "--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Seed of all that is random."
 )
@@ -97,6 +102,8 @@ def print_figures(mission: Mission) -> None:
         screen.print(
             f"as the paper: {paper['guards']} guards, {paper['makespan']:,.0f} s (at least {paper['bound']:,.0f} s)"
         )
+    for note in mission.figures.get("notes", ()):
+        print_reason(screen, "note", note)
     for reason in mission.reasons:
         print_reason(screen, "infeasible", reason)
 
@@ -115,6 +122,13 @@ WORDS = {
     "makespan": ("makespan", "{:,.0f} s", 1.0),
     "ratio": ("over its bound", "{:.2f}", 1.0),
     "energy": ("energy", "{:,.0f} Wh", 1.0),
+    "lowest_above_ground": ("lowest above ground", "{:.1f} m", 1.0),
+    "highest_above_ground": ("highest", "{:.1f} m", 1.0),
+    "highest_amsl": ("highest above sea", "{:.1f} m", 1.0),
+    "terrain_waypoints": ("waypoints for the terrain", "{:,.0f}", 1.0),
+    "worst_ground_resolution": ("worst ground resolution", "{:.2f} cm", 100.0),
+    "least_side_overlap": ("least side overlap", "{:.1f} %", 100.0),
+    "least_frontal_overlap": ("least frontal overlap", "{:.1f} %", 100.0),
 }
 
 

@@ -6,12 +6,22 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from quarterdeck.cli.output import emit, force_option, output_option, print_figures, seed_option
+from quarterdeck.cli.output import (
+    emit,
+    force_option,
+    output_option,
+    print_figures,
+    seed_option,
+    terrain_option,
+    tolerance_option,
+)
 from quarterdeck.cli.parameters import Choice, Numbers, Real
 
 if TYPE_CHECKING:
     from quarterdeck.api import Method
     from quarterdeck.geo.frame import Frame
+    from quarterdeck.geo.scenario import Scenario
+    from quarterdeck.geo.terrain import Terrain
 
 OPTIONS = {
     "stc": ("spacing", "placement", "angle", "edge"),
@@ -42,10 +52,22 @@ OPTIONS = {
 @click.option("--range", type=Real(), help="guards: metres that vehicles see which have no range of their own.")
 @click.option("--mode", type=Choice(["optimised", "paper"]), help="guards: as the paper, or better (default).")
 @click.option("--inspect", type=Choice(["area", "border"]), help="guards: see all of the area (default), or all edges.")
+@terrain_option
+@tolerance_option
 @seed_option
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on standard error instead of a table.")
 @force_option
-def command(site: str, output: str, method: "Method | None", seed: int, as_json: bool, force: bool, **options: Any) -> int:
+def command(
+    site: str,
+    output: str,
+    method: "Method | None",
+    terrain: str | None,
+    tolerance: float,
+    seed: int,
+    as_json: bool,
+    force: bool,
+    **options: Any,
+) -> int:
     """Plan a mission that covers the areas of SITE, a GeoJSON file (- reads standard input), and write it as a PLAN."""
     from quarterdeck.api import default_method, plan, plan_text, read_scenario
 
@@ -59,7 +81,8 @@ def command(site: str, output: str, method: "Method | None", seed: int, as_json:
         given["angle"] = math.radians(90.0 - given["angle"])
     if "entry" in given:
         given["entry"] = _entry(given["entry"], scenario.frame)
-    mission = plan(scenario, method=method, seed=seed, **given)
+    ground = _terrain(terrain, scenario) if terrain else None
+    mission = plan(scenario, method=method, seed=seed, terrain=ground, tolerance=tolerance, **given)
     text = plan_text(mission)
     emit(text, output, force=force)
     if as_json:
@@ -68,6 +91,18 @@ def command(site: str, output: str, method: "Method | None", seed: int, as_json:
     else:
         print_figures(mission)
     return 0 if mission.feasible else 1
+
+
+def _terrain(path: str, scenario: "Scenario") -> "Terrain":
+    """Return the terrain about the site. Raises InputError if nothing flies, or it is not known all over the areas."""
+    from quarterdeck.geo.errors import InputError
+    from quarterdeck.geo.terrain import read_terrain, refuse_void
+
+    if not any(v.domain == "aerial" for v in scenario.vehicles):
+        raise InputError("--terrain is for what flies, and no vehicle of this site does; `simulate` has it for rovers")
+    terrain = read_terrain(path, scenario.frame, scenario.site.operating.bounds)
+    refuse_void(terrain, scenario.site.area, scenario.frame)
+    return terrain
 
 
 def _entry(lonlat: tuple[float, float], frame: "Frame") -> tuple[float, float]:

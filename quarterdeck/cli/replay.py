@@ -126,8 +126,14 @@ def remade(plan: Mission, scenario: Scenario, file: str, site: str) -> Mission:
         raise InputError(f"{site}: is not the site that {file} was made of (another SHA-256)")
     options = dict(plan.parameters)
     own_map = options.pop("map", "site") != "site"
-    if own_map or {"replanned_at", "sortie"} & set(options) or plan.method not in ("stc", "lines", "guards", "assign"):
-        raise InputError(f"{file}: was not made of a site alone (replanned, on a map, or by hand); plan it as it was")
+    if (
+        own_map
+        or {"replanned_at", "sortie", "terrain"} & set(options)
+        or plan.method not in ("stc", "lines", "guards", "assign")
+    ):
+        raise InputError(
+            f"{file}: was not made of a site alone (replanned, over terrain, on a map, or by hand); plan it as it was"
+        )
     scenario = replace(scenario, name=plan.name)
     try:
         if plan.method == "assign":

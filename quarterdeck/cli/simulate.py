@@ -144,16 +144,16 @@ def execute(
     """Execute a plan with the command's options; return its mission and the run, whose report tells them."""
     options = dict(locals())
     from quarterdeck.geo.reader import read_obstacles
+    from quarterdeck.geo.terrain import read_terrain
     from quarterdeck.mission.planfile import read_plan
     from quarterdeck.mission.recovery import recovering
     from quarterdeck.physics.sensing import Sensing
     from quarterdeck.physics.simulate import simulate
-    from quarterdeck.physics.terrain import read_terrain
 
     files = {name: digest(options[name]) for name in FILES if options[name]}
     mission = read_plan(plan)
     strange = read_obstacles(unmapped, mission.frame) if unmapped else ()
-    ground = read_terrain(terrain) if terrain else None
+    ground = read_terrain(terrain, mission.frame, mission.site.operating.bounds) if terrain else None
     sensing = Sensing(gnss=gnss, lidar=lidar, amcl=amcl, unmapped=strange, field=field)
     with _progress(mission.name) as progress:
         run = simulate(

@@ -9,10 +9,10 @@ from shapely import box
 from quarterdeck.cli import main
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Obstacle
+from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.planfile import plan_text
 from quarterdeck.physics.rover import GRAVITY, climb_parameters
 from quarterdeck.physics.simulate import simulate
-from quarterdeck.physics.terrain import Terrain, read_terrain
 from quarterdeck.physics.world import open_world
 
 pytest.importorskip("pybullet", reason="PyBullet has wheels for Linux and CPython 3.11 only")
@@ -112,20 +112,6 @@ def test_obstacle_on_a_hill_stops_a_rover(sail):
     assert run.report.vehicles[0].touched
     assert run.trace.x.max() < 10.0
     assert np.abs(run.trace.z).max() == 0.0
-
-
-def test_esri_ascii_and_npz_are_read_alike(tmp_path):
-    """Rows from the north, corners half a cell outside the first node, no data as not known."""
-    (tmp_path / "t.asc").write_text(
-        "ncols 3\nnrows 2\nxllcorner 9\nyllcorner 19\ncellsize 2\nNODATA_value -1\n4 5 6\n1 2 -1\n", encoding="ascii"
-    )
-    heights = np.array([[1.0, 2.0, np.nan], [4.0, 5.0, 6.0]])
-    np.savez(tmp_path / "t.npz", origin=(10.0, 20.0), cell=2.0, heights=heights)
-    for name in ("t.asc", "t.npz"):
-        terrain = read_terrain(str(tmp_path / name))
-        assert (terrain.origin, terrain.cell) == ((10.0, 20.0), 2.0)
-        assert np.array_equal(terrain.heights, heights, equal_nan=True)
-    assert terrain.height(np.array([10.0, 22.0])) == 4.0
 
 
 def test_command_line_drives_on_a_terrain(mow, tmp_path, capfd):
