@@ -11,3 +11,9 @@ class InputError(QuarterdeckError, ValueError):
 
 class UnavailableError(QuarterdeckError, RuntimeError):
     """Something that this machine lacks is needed, such as PyBullet. The text says how to get it; exit status 2."""
+
+
+def one_line(text: str) -> str:
+    """Return a message as one line of at most 1000 characters, nothing in it that steers a terminal; names come from files."""
+    line = "".join(c if c.isprintable() else "\ufffd" for c in " ".join(text.split()))
+    return line if len(line) <= 1000 else f"{line[:997]}..."

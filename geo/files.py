@@ -1,13 +1,25 @@
-"""Writing files: beside, then renamed, so that none is ever half written; and names that are safe for files."""
+"""Reading files, and standard input; writing them beside, then renamed, so that none is ever half written; safe names."""
 
 import os
 import re
+import sys
 import tempfile
 import unicodedata
 from collections.abc import Iterable
 from pathlib import Path
 
 from quarterdeck.geo.errors import InputError
+
+
+def read_bytes(source: str | Path) -> bytes:
+    """Return the bytes of a file, or of standard input for `-`. Raises InputError if it cannot be read."""
+    if str(source) == "-":
+        return sys.stdin.buffer.read()
+    try:
+        return Path(source).read_bytes()
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise InputError(f"{source}: cannot be read ({why}); give the path of a file") from None
 
 
 def refuse_existing(path: Path, *, force: bool) -> None:

@@ -3,18 +3,50 @@
 import json
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from shapely import MultiLineString, MultiPolygon, Polygon, is_valid_reason, line_merge, union_all
 
 from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.files import read_bytes
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.importers import as_geojson
 from quarterdeck.geo.scenario import as_multipolygon
 
+STDIN = "standard input"
 _SURROGATE = re.compile(r"[\ud800-\udfff]")
 WGS84_NAMES = ("urn:ogc:def:crs:OGC:1.3:CRS84", "urn:ogc:def:crs:OGC::CRS84", "urn:ogc:def:crs:EPSG::4326", "EPSG:4326")
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A file that has been read: its `name` for messages, its `data`, and the FeatureCollection in it, `content`."""
+
+    name: str
+    data: bytes
+    content: dict[str, Any]
+
+    @property
+    def stem(self) -> str:
+        """The name without folder and suffix."""
+        return "site" if self.name == STDIN else Path(self.name).stem
+
+
+def opened(source: str | Path | Document) -> Document:
+    """Return what is in a file, or in standard input for `-`; what has been read comes back as it is.
+
+    Raises InputError, naming the file, if it cannot be read or is none that `parse` takes.
+    """
+    if isinstance(source, Document):
+        return source
+    name, data = STDIN if str(source) == "-" else str(source), read_bytes(source)
+    try:
+        return Document(name, data, parse(data))
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
 
 
 def parse(data: bytes) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """From a site's GeoJSON to a `Scenario`: everything is checked here, once, and every problem told with its place."""
 
 import hashlib
-import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
@@ -13,7 +12,7 @@ from shapely.ops import unary_union
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.frame import Frame
-from quarterdeck.geo.geojson import parse, position_problem, positions, read_corridor, read_polygon
+from quarterdeck.geo.geojson import Document, opened, position_problem, positions, read_corridor, read_polygon
 from quarterdeck.geo.models import DEFAULT_MODEL, load_model
 from quarterdeck.geo.properties import GEOMETRIES, LINES, property_problems
 from quarterdeck.geo.scenario import (
@@ -35,15 +34,15 @@ POINTS = ("casualty", "medic", "rendezvous")
 MAX_RADIUS = 200_000.0  # m from the frame's origin: beyond it the projection's scale is off by more than 0.05 %
 
 
-def read_scenario(source: str | Path) -> Scenario:
-    """Return the scenario in a GeoJSON file; `-` reads standard input.
+def read_scenario(source: str | Path | Document) -> Scenario:
+    """Return the scenario in a GeoJSON file, or in one that has been read; `-` reads standard input.
 
     Raises InputError with the first problem, in one line that names the feature, its place and what to do.
     """
     return _scenario(source, None)
 
 
-def read_additions(source: str | Path, frame: Frame) -> Scenario:
+def read_additions(source: str | Path | Document, frame: Frame) -> Scenario:
     """Return what a GeoJSON file adds to a mission, in metres of its `frame`: any roles, none required.
 
     Raises InputError as `read_scenario` does.
@@ -51,25 +50,21 @@ def read_additions(source: str | Path, frame: Frame) -> Scenario:
     return _scenario(source, frame)
 
 
-def _scenario(source: str | Path, frame: Frame | None) -> Scenario:
-    data = read_bytes(source)
-    name = "standard input" if str(source) == "-" else str(source)
-    try:
-        scenario, problems = _read(data, _name(source), frame)
-    except InputError as error:
-        raise InputError(f"{name}: {error}") from None
+def _scenario(source: str | Path | Document, frame: Frame | None) -> Scenario:
+    document = opened(source)
+    scenario, problems = _read(document, frame)
     if scenario is None:
         more = f" (and {len(problems) - 1} more; `quarterdeck check` lists them)" if len(problems) > 1 else ""
-        raise InputError(f"{name}: {problems[0]}{more}")
+        raise InputError(f"{document.name}: {problems[0]}{more}")
     return scenario
 
 
-def find_problems(source: str | Path) -> list[str]:
-    """Return every problem of a site's file, one line each; none if it can be read."""
-    try:
-        return _read(read_bytes(source), _name(source))[1]
-    except InputError as error:
-        return [str(error)]
+def examine(source: str | Path | Document) -> tuple[Scenario | None, list[str]]:
+    """Return the scenario in a GeoJSON file, None where it has problems, and every problem, one line each.
+
+    Raises InputError if it is no GeoJSON in WGS84.
+    """
+    return _read(opened(source))
 
 
 def read_obstacles(source: str | Path, frame: Frame) -> tuple[Obstacle, ...]:
@@ -83,25 +78,11 @@ def read_obstacles(source: str | Path, frame: Frame) -> tuple[Obstacle, ...]:
     return obstacles
 
 
-def read_bytes(source: str | Path) -> bytes:
-    """Return the bytes of a file, or of standard input for `-`. Raises InputError if it cannot be read."""
-    if str(source) == "-":
-        return sys.stdin.buffer.read()
-    try:
-        return Path(source).read_bytes()
-    except OSError as error:
-        raise InputError(f"{source}: cannot be read ({error.strerror}); give the path of a GeoJSON file") from None
-
-
-def _name(source: str | Path) -> str:
-    return "site" if str(source) == "-" else Path(source).stem
-
-
-def _read(data: bytes, name: str, frame: Frame | None = None) -> tuple[Scenario | None, list[str]]:
+def _read(document: Document, frame: Frame | None = None) -> tuple[Scenario | None, list[str]]:
     """Return the scenario, or None, and all problems found; with a `frame` given, nothing in particular is required."""
-    document = parse(data)
+    content = document.content
     problems: list[str] = []
-    features = [f for i, raw in enumerate(document["features"]) if (f := _feature(i, raw, problems))]
+    features = [f for i, raw in enumerate(content["features"]) if (f := _feature(i, raw, problems))]
     required = ("area", "task", "casualty") if frame is None else tuple(GEOMETRIES)
     if not any(f["role"] in required for f in features) and not problems:
         problems.append('no feature has the role "area" or "task"; give the polygon to be covered "role": "area"')
@@ -124,7 +105,7 @@ def _read(data: bytes, name: str, frame: Frame | None = None) -> tuple[Scenario 
     points = {role: tuple((f["id"], _xy(f, frame)) for f in features if f["role"] == role) for role in POINTS}
     site = _site(features, shapes, [*fleet, *tasks], [xy for r in points for _, xy in points[r]])
     scenario = Scenario(
-        name=document["name"] if isinstance(document.get("name"), str) else name,
+        name=content["name"] if isinstance(content.get("name"), str) else document.stem,
         frame=frame,
         site=site,
         vehicles=fleet,
@@ -137,7 +118,7 @@ def _read(data: bytes, name: str, frame: Frame | None = None) -> tuple[Scenario 
         medics=points["medic"],
         rendezvous=points["rendezvous"],
         spacing=spacings[0] if spacings else None,
-        input_hash=hashlib.sha256(data).hexdigest(),
+        input_hash=hashlib.sha256(document.data).hexdigest(),
     )
     problems += _area_problems(features)
     problems += _vehicle_problems(features, scenario)

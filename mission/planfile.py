@@ -18,11 +18,11 @@ from shapely.geometry import shape as from_geojson
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.features import collection, degrees, feature, geometry, point_feature, polygon_feature, position
 from quarterdeck.geo.frame import Frame
-from quarterdeck.geo.geojson import parse
+from quarterdeck.geo.geojson import Document, opened
 from quarterdeck.geo.models import VehicleModel
 from quarterdeck.geo.palette import CASUALTY, colours
 from quarterdeck.geo.properties import PROPERTIES, property_problems
-from quarterdeck.geo.reader import MAX_RADIUS, read_bytes
+from quarterdeck.geo.reader import MAX_RADIUS
 from quarterdeck.geo.scenario import Area, Casualty, Obstacle, Precedence, Sensor, Site, Task, Vehicle, as_multipolygon
 from quarterdeck.geo.typed import fits, wrong_field
 from quarterdeck.mission.mission import Layer, Leg, Mission, Route, Waypoint
@@ -140,29 +140,40 @@ def _routes(mission: Mission) -> list[dict[str, Any]]:
     return features
 
 
-def read_plan(source: str | Path) -> Mission:
-    """Return the mission in a PLAN file; `-` reads standard input.
+def read_plan(source: str | Path | Document) -> Mission:
+    """Return the mission in a PLAN file, or in one that has been read; `-` reads standard input.
 
     Raises InputError if it is no plan, or a part of it is missing or damaged.
     """
-    name = "standard input" if str(source) == "-" else str(source)
-    data = read_bytes(source)
+    document = opened(source)
     try:
-        document = parse(data)
-        features = [f for f in document["features"] if isinstance(f, dict) and isinstance(f.get("properties"), dict)]
-        headers = [f["properties"] for f in features if f["properties"].get("role") == "plan"]
+        features = _features(document)
+        headers = _headers(features)
         if not headers:
             raise InputError("is a site or another GeoJSON, not a PLAN; make one with `quarterdeck plan`")
         if headers[0].get("format") != FORMAT:
             raise InputError(f"is a PLAN of format {headers[0].get('format')}, this version reads {FORMAT}; plan it again")
         try:
             with np.errstate(all="raise"):
-                return _mission(str(document.get("name", "")), headers[0], features)
+                return _mission(str(document.content.get("name", "")), headers[0], features)
         except DAMAGE as error:
             what = f"{error} is missing" if isinstance(error, KeyError) else " ".join(str(error).split())[:120]
             raise InputError(f"is a damaged PLAN ({what}); plan it again") from None
     except InputError as error:
-        raise InputError(f"{name}: {error}") from None
+        raise InputError(f"{document.name}: {error}") from None
+
+
+def is_plan(document: Document) -> bool:
+    """Tell a PLAN from a site."""
+    return bool(_headers(_features(document)))
+
+
+def _features(document: Document) -> list[dict[str, Any]]:
+    return [f for f in document.content["features"] if isinstance(f, dict) and isinstance(f.get("properties"), dict)]
+
+
+def _headers(features: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    return [f["properties"] for f in features if f["properties"].get("role") == "plan"]
 
 
 def _mission(name: str, header: dict[str, Any], features: list[dict[str, Any]]) -> Mission:

@@ -16,7 +16,8 @@ from quarterdeck.campaign.kind import Case, Kind, is_number
 from quarterdeck.campaign.plans import PLAN
 from quarterdeck.campaign.triage import TEAM, TRIAGE
 from quarterdeck.geo.errors import InputError
-from quarterdeck.geo.reader import read_bytes, read_scenario
+from quarterdeck.geo.files import read_bytes
+from quarterdeck.geo.reader import read_scenario
 from quarterdeck.mission.planfile import read_plan
 from quarterdeck.physics.faults import read_faults
 from quarterdeck.physics.report import check_limits

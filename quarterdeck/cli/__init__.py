@@ -8,7 +8,7 @@ from importlib import import_module
 import click
 
 from quarterdeck import __version__
-from quarterdeck.geo.errors import QuarterdeckError
+from quarterdeck.geo.errors import QuarterdeckError, one_line
 
 VERBS = {
     "chart": "ENC cells as a site.",
@@ -76,7 +76,7 @@ def main(args: list[str] | None = None) -> None:
     try:
         status = group.main(args=args, prog_name="quarterdeck", standalone_mode=False)
     except QuarterdeckError as error:
-        _stop(f"quarterdeck: {_line(str(error))}", 2)
+        _stop(f"quarterdeck: {one_line(str(error))}", 2)
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)
@@ -88,12 +88,6 @@ def main(args: list[str] | None = None) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
     sys.exit(status if isinstance(status, int) else 0)
-
-
-def _line(text: str) -> str:
-    """Return one line of at most 1000 characters: names from files may hold line ends, or what would steer a terminal."""
-    text = "".join(c if c.isprintable() else " " if c.isspace() else "\ufffd" for c in " ".join(text.split()))
-    return text if len(text) <= 1000 else f"{text[:997]}..."
 
 
 def _stop(text: str, status: int) -> None:

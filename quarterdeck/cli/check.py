@@ -1,8 +1,13 @@
 """`quarterdeck check`: every problem of a site or a plan."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import click
 
-from quarterdeck.cli.output import put_back
+if TYPE_CHECKING:
+    from quarterdeck.geo.geojson import Document
 
 
 @click.command(short_help="Every problem of a site or a plan.")
@@ -13,29 +18,35 @@ def command(file: str) -> int:
     For a plan: clear of obstacles, inside the fence, separated in time, energy with a reserve. Exit status 0 if there is
     none, 2 if a site cannot be planned, 1 if a plan should not be flown.
     """
+    from quarterdeck.geo.errors import one_line
+    from quarterdeck.geo.geojson import opened
+    from quarterdeck.mission.planfile import is_plan
+
+    document = opened(file)
+    problems, status = (_of_plan(document), 1) if is_plan(document) else (_of_site(document), 2)
+    for problem in problems:
+        click.echo(one_line(problem))
+    if not problems:
+        click.echo(f"{document.name}: no problem found", err=True)
+    return status if problems else 0
+
+
+def _of_plan(document: Document) -> list[str]:
+    from quarterdeck.mission.check import check_mission
+    from quarterdeck.mission.planfile import read_plan
+
+    return list(check_mission(read_plan(document)))
+
+
+def _of_site(document: Document) -> list[str]:
     from quarterdeck.coverage.shares import shares
     from quarterdeck.geo.errors import InputError
-    from quarterdeck.geo.geojson import parse
-    from quarterdeck.geo.reader import find_problems, read_bytes, read_scenario
+    from quarterdeck.geo.reader import examine
 
-    data = read_bytes(file)
-    features = parse(data)["features"]
-    properties = [f.get("properties") for f in features if isinstance(f, dict)]
-    if any(isinstance(p, dict) and p.get("role") == "plan" for p in properties):
-        from quarterdeck.mission.check import check_mission
-        from quarterdeck.mission.planfile import read_plan
-
-        problems, status = list(check_mission(read_plan(put_back(file, data)))), 1
-    else:
-        problems, status = find_problems(put_back(file, data)), 2
-        if not problems:
-            vehicles = read_scenario(put_back(file, data)).vehicles
-            try:
-                shares(vehicles) if vehicles else None
-            except InputError as error:
-                problems = [str(error)]
-    for problem in problems:
-        click.echo(problem)
-    if not problems:
-        click.echo(f"{file}: no problem found", err=True)
-    return status if problems else 0
+    scenario, problems = examine(document)
+    if scenario is not None and scenario.vehicles:
+        try:
+            shares(scenario.vehicles)
+        except InputError as error:
+            return [str(error)]
+    return problems

@@ -11,8 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from quarterdeck.geo.files import refuse_existing, write_file
-from quarterdeck.geo.reader import read_bytes
+from quarterdeck.geo.files import read_bytes, refuse_existing, write_file
 from quarterdeck.mission.mission import Mission
 
 

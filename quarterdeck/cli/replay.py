@@ -62,8 +62,8 @@ def command(file: str, plan: str | None, site: str | None, within: float, as_jso
 
 def _read(file: str) -> dict[str, Any]:
     """Return a report or a plan as JSON. Raises InputError if it is neither."""
+    from quarterdeck.geo.files import read_bytes
     from quarterdeck.geo.geojson import parse_json
-    from quarterdeck.geo.reader import read_bytes
 
     try:
         document = parse_json(read_bytes(file))

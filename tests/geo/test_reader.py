@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.properties import json_schema
-from quarterdeck.geo.reader import find_problems, read_scenario
+from quarterdeck.geo.reader import examine, read_scenario
 
 ROOT = Path(__file__).parents[2]
 SITES = sorted((ROOT / "data").glob("*.geojson"))
@@ -186,4 +186,4 @@ def test_all_problems_are_found(tmp_path):
     document = site()
     document["features"][2]["properties"]["speed"] = "fast"
     document["features"][3]["properties"]["domain"] = "sea"
-    assert len(find_problems(write(tmp_path, document))) == 2
+    assert len(examine(write(tmp_path, document))[1]) == 2
