@@ -14,6 +14,6 @@ class UnavailableError(QuarterdeckError, RuntimeError):
 
 
 def one_line(text: str) -> str:
-    """Return a message as one line of at most 1000 characters, with nothing that steers a terminal: names are from files."""
+    """Return a message as one line of at most 1000 characters, without what steers a terminal: names are from files."""
     line = "".join(c if c.isprintable() else "\ufffd" for c in " ".join(text.split()))
     return line if len(line) <= 1000 else f"{line[:997]}..."
