@@ -1,10 +1,11 @@
-"""Write what is generated, `make docs` runs it: docs/geojson.md, docs/triage-machines.md and geo/site.schema.json."""
+"""Write what is generated, `make docs` runs it: geojson.md, triage-machines.md, reproduce.md and geo/site.schema.json."""
 
 import json
 from pathlib import Path
 
 from quarterdeck.geo.properties import GEOMETRIES, PROPERTIES, json_schema
 from quarterdeck.mission.triage.machines import MACHINES, as_markdown
+from quarterdeck.reproduce.all import PAPERS, section
 
 ROOT = Path(__file__).parents[1]
 
@@ -73,6 +74,23 @@ def machines_page() -> str:
     return "\n".join([head, made, *(as_markdown(kind) for kind in MACHINES)])
 
 
+REPRODUCTION = """# The papers' tables beside ours
+
+Made by `make docs` of what `quarterdeck reproduce all` prints, in about a minute. Each part stands under the command that
+prints it alone, whose options draw the papers' figures too. Seconds and fitted exponents are of the machine that made this
+page; all else is the same on every machine of one kind.
+"""
+
+
+def reproduction_page() -> str:
+    """Return docs/reproduce.md: runs the four studies."""
+    lines = [REPRODUCTION]
+    for paper, title in PAPERS.items():
+        command, text, _ = section(paper)
+        lines += [f"## {title}\n", f"    {command}\n", f"```text\n{text}```\n"]
+    return "\n".join(lines)
+
+
 def schema_text() -> str:
     """Return geo/site.schema.json."""
     return json.dumps(json_schema(), indent=1) + "\n"
@@ -81,4 +99,5 @@ def schema_text() -> str:
 if __name__ == "__main__":
     (ROOT / "docs" / "geojson.md").write_text(geojson_page(), encoding="utf-8")
     (ROOT / "docs" / "triage-machines.md").write_text(machines_page(), encoding="utf-8")
+    (ROOT / "docs" / "reproduce.md").write_text(reproduction_page(), encoding="utf-8")
     (ROOT / "geo" / "site.schema.json").write_text(schema_text(), encoding="utf-8")

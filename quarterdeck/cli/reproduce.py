@@ -5,6 +5,7 @@ import click
 from quarterdeck.cli import LazyGroup
 
 PAPERS: dict[str, str] = {
+    "all": "All four papers, one after another.",
     "inspection": "Case studies of tasks with priority, time and precedence.",
     "ecdis": "Coverage by several USVs beside an ECDIS.",
     "guards": "Limited visibility, any failures: figures, properties, theorems, complexities.",
