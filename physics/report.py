@@ -97,6 +97,7 @@ class VehicleReport:
 class Report:
     """A run's figures, the limits that they were held against, and why it failed (`reasons`; it passed when there are
     none). `command` has the `options` of the command line that it came of, and the SHA-256 of the `files` among them.
+    `notes` say what of a log was left out or reckoned; a simulated run has none.
     """
 
     mission: str
@@ -108,6 +109,7 @@ class Report:
     reasons: tuple[str, ...]
     trace_hash: str
     command: Mapping[str, Any] | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -154,11 +156,13 @@ def measure(
     lost: Sequence[bool] | None = None,
     trouble: Sequence[str] = (),
     localisation: Sequence[Mapping[str, Any]] | None = None,
+    notes: Sequence[str] = (),
 ) -> Report:
     """Measure a trace against the mission and judge it.
 
     `finished` and `aground` are (k,), `served` the times at which tasks were, `lost` (k,) the vehicles lost by a fault
-    (default: none), `trouble` what made vehicles give up, a line each, `localisation` what `Senses.report` returns.
+    (default: none), `trouble` what made vehicles give up, a line each, `localisation` what `Senses.report` returns,
+    `notes` what is told of a log.
     Raises InputError for an unknown limit.
     """
     allowed = check_limits(limits)
@@ -175,7 +179,9 @@ def measure(
     vehicles = tuple(replace(v, lost=g, localisation=p) for v, g, p in zip(vehicles, gone, places, strict=True))
     figures = _figures(mission, trace, vehicles, served)
     reasons = [*trouble, *_reasons(mission, vehicles, figures, allowed)]
-    return Report(mission.name, VERSION, settings, allowed, figures, vehicles, tuple(reasons), trace.hash)
+    return Report(
+        mission.name, VERSION, settings, allowed, figures, vehicles, tuple(reasons), trace.hash, notes=tuple(notes)
+    )
 
 
 def _vehicle(

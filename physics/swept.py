@@ -2,15 +2,16 @@
 between.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
 from numba import njit
 from shapely import Polygon
 
-from quarterdeck.geo.scenario import Site, Vehicle
-from quarterdeck.physics.trace import Trace
+from quarterdeck.geo.scenario import Obstacle, Site, Vehicle
+from quarterdeck.physics.trace import UNKNOWN, Trace
 
 PIECE = 50  # samples of track tested at once
 EXACT = 0.001  # m
@@ -32,16 +33,25 @@ def sweep(site: Site, vehicle: Vehicle, trace: Trace, column: int) -> Swept:
     """Sweep the hull of the vehicle in `column` of the trace through the obstacles that block it.
 
     Between two poses the hull covers the convex hull of its two rectangles, to EXACT. An aerial vehicle above an obstacle
-    is clear of it.
+    is clear of it. Where it is not known where the vehicle was nothing is swept.
     """
     obstacles = [o for o in site.obstacles if vehicle.domain in o.blocks]
     if not obstacles:
         return Swept(float("inf"), 0.0, "", ())
-    xy = np.column_stack([trace.x[:, column], trace.y[:, column]])
-    moved = np.r_[True, np.abs(np.diff(xy, axis=0)).max(axis=1) > 0] | np.r_[True, np.diff(trace.heading[:, column]) != 0]
+    runs = [_sweep(obstacles, vehicle, trace, column, run) for run in trace.known(column)]
+    nearest = min(runs, key=lambda run: run.clearance, default=Swept(float("inf"), 0.0, "", ()))
+    hit = {name for run in runs for name in run.hits}
+    return replace(nearest, hits=tuple(o.id for o in obstacles if o.id in hit))
+
+
+def _sweep(obstacles: Sequence[Obstacle], vehicle: Vehicle, trace: Trace, column: int, run: slice) -> Swept:
+    """Sweep the hull through the obstacles over one run of samples."""
+    xy = np.column_stack([trace.x[run, column], trace.y[run, column]])
+    heading = trace.heading[run, column]
+    moved = np.r_[True, np.abs(np.diff(xy, axis=0)).max(axis=1) > 0] | np.r_[True, np.diff(heading) != 0]
     keep = np.flatnonzero(moved)
-    xy, z = xy[keep], trace.z[keep, column]
-    heading, time = trace.heading[keep, column], trace.time[keep]
+    xy, z = xy[keep], trace.z[run, column][keep]
+    heading, time = heading[keep], trace.time[run][keep]
     polygons = np.array([o.polygon for o in obstacles])
     height = np.array([o.height for o in obstacles])
     reach = np.hypot(vehicle.model.length, vehicle.model.width) / 2
@@ -113,7 +123,7 @@ def _hulls(xy: np.ndarray, heading: np.ndarray, length: float, width: float) -> 
 
 def excursion(site: Site, trace: Trace, column: int) -> float:
     """Return how far the track of the vehicle in `column` left the operating area, metres; 0 if never."""
-    track = np.column_stack([trace.x[:, column], trace.y[:, column]])
+    track = np.column_stack([trace.x[:, column], trace.y[:, column]])[trace.kind[:, column] != UNKNOWN]
     shapely.prepare(site.operating)
     outside = ~shapely.intersects_xy(site.operating, track[:, 0], track[:, 1])
     if not outside.any():

@@ -1,9 +1,14 @@
 """What happened: every vehicle's motion, sampled."""
 
 import hashlib
+import io
 from dataclasses import dataclass, fields
 
 import numpy as np
+
+from quarterdeck.geo.frame import Frame
+
+UNKNOWN = -1  # kind of a leg: where the vehicle was is not known (a gap in its log)
 
 
 @dataclass(frozen=True, slots=True)
@@ -12,10 +17,10 @@ class Trace:
 
     `x`, `y`, `z` metres in the frame, `heading` radians counter-clockwise from east, `speed` m/s over ground, `energy`
     Wh used, `leg` the number of the waypoint made for, in the last command (the route's, where nothing was changed),
-    `kind` its code in `paths.LEGS`, `cross` metres to port of the leg (aerial: off it, in any direction), `turning`
-    near a corner or holding, `underway` clear of the places where it is launched and recovered, `contact` touching an
-    obstacle or another vehicle. `z` is above the ground, whose height `ground` is metres in the terrain's datum (0
-    without one, and where it is not known); `pitch` radians, nose up, is that of a ground vehicle on its slope.
+    `kind` its code in `paths.LEGS` or UNKNOWN, `cross` metres to port of the leg (aerial: off it, in any direction),
+    `turning` near a corner or holding, `underway` clear of the places where it is launched and recovered, `contact`
+    touching an obstacle or another vehicle. `z` is above the ground, whose height `ground` is metres in the terrain's
+    datum (0 without one, and where it is not known); `pitch` radians, nose up, is that of a ground vehicle on its slope.
     """
 
     vehicles: tuple[str, ...]
@@ -42,6 +47,19 @@ class Trace:
         for field in fields(self)[1:]:
             digest.update(np.ascontiguousarray(getattr(self, field.name)).tobytes())
         return digest.hexdigest()
+
+    def to_bytes(self, frame: Frame) -> bytes:
+        """Return all of it as NPZ, with the `origin` (longitude, latitude) of the frame; `geo.logs` reads it as a log."""
+        buffer = io.BytesIO()
+        columns = {field.name: getattr(self, field.name) for field in fields(self)[1:]}
+        np.savez(buffer, vehicles=np.array(self.vehicles), origin=np.array([frame.lon, frame.lat]), **columns)
+        return buffer.getvalue()
+
+    def known(self, column: int) -> list[slice]:
+        """Return the unbroken runs of samples at which it is known where the vehicle in `column` was."""
+        sure = self.kind[:, column] != UNKNOWN
+        edges = np.flatnonzero(np.diff(np.r_[0, sure.astype(np.int8), 0])).reshape(-1, 2)
+        return [slice(int(first), int(last)) for first, last in edges]
 
 
 COLUMNS = {

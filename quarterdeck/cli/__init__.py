@@ -20,6 +20,7 @@ VERBS = {
     "plan": "Cover an area.",
     "replan": "From what has happened so far: losses, additions, withdrawals.",
     "replay": "Run a report or a plan again, and compare.",
+    "report": "Measure a real mission from its logs as simulate measures a virtual one.",
     "reproduce": "A paper's tables beside ours.",
     "simulate": "Execute a plan in PyBullet; report and verdict.",
     "triage": "Search, relay, treat; the four methods.",

@@ -59,6 +59,7 @@ class Limit(click.ParamType):
 @click.option("--report", metavar="FILE", callback=not_there, help="Write the report as JSON.")
 @click.option("--rrd", metavar="FILE", callback=not_there, help="Record the run for rerun.")
 @click.option("--picture", metavar="FILE", callback=not_there, help="Draw plan, tracks and misses as a PNG.")
+@click.option("--trace", metavar="FILE", callback=not_there, help="Write every sample of the run (NPZ).")
 @click.option("--current", type=Vector(), default="0,0", show_default=True, help="Water's motion, m/s east and north.")
 @click.option("--wind", type=Vector(), default="0,0", show_default=True, help="Mean wind, m/s towards east and north.")
 @click.option("--gusts", type=Real(min=0), default=0.0, show_default=True, help="Standard deviation of gusts, m/s.")
@@ -97,6 +98,7 @@ def command(
     report: str | None,
     rrd: str | None,
     picture: str | None,
+    trace: str | None,
     as_json: bool,
     force: bool,
     **options: Any,
@@ -106,6 +108,8 @@ def command(
     Exit status 1 if the verdict fails.
     """
     mission, run = execute(**options)
+    if trace:
+        emit(run.trace.to_bytes(mission.frame), trace, force=force)
     if report:
         emit(run.report.to_json(), report, force=force)
     if rrd:
@@ -203,13 +207,13 @@ def _progress(title: str) -> Iterator[Callable[[float, float], None]]:
         yield tell
 
 
-def print_report(mission: Mission, report: Report) -> None:
+def print_report(mission: Mission, report: Report, *, how: str = "simulated") -> None:
     """Print the verdict and its figures on standard error."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
     screen = console()
-    table = Table(title=f"{mission.name}: simulated", title_justify="left", box=SIMPLE_HEAD)
+    table = Table(title=f"{mission.name}: {how}", title_justify="left", box=SIMPLE_HEAD)
     for column in ("vehicle", "time", "energy", "off track", "obstacle", "vehicle"):
         table.add_column(column, justify="left" if not table.columns else "right", no_wrap=True)
     for v in report.vehicles[:60]:
@@ -235,6 +239,8 @@ def print_report(mission: Mission, report: Report) -> None:
     if figures["localisation_p95"] is not None:
         words.append(f"localised to {figures['localisation_p95']:.2f} m (95 %, worst vehicle)")
     screen.print("; ".join(words))
+    for note in report.notes:
+        print_reason(screen, "note", note)
     for reason in report.reasons:
         print_reason(screen, "failed", reason)
     if report.passed:

@@ -1,0 +1,201 @@
+"""A real mission measured as a simulated one: the trace that its logs come to, and the report of it."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from quarterdeck.coverage.metrics import uncovered
+from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.scenario import Vehicle
+from quarterdeck.mission.matching import Followed, follow, off_legs
+from quarterdeck.mission.mission import Mission, Route
+from quarterdeck.mission.served import served_tasks
+from quarterdeck.mission.tracks import NEAR, Record, Track
+from quarterdeck.physics.paths import LEGS, vehicle_limits
+from quarterdeck.physics.report import measure
+from quarterdeck.physics.seen import unseen, whole_tracks
+from quarterdeck.physics.simulate import Run
+from quarterdeck.physics.swath import TOLERANCE, driven_tracks
+from quarterdeck.physics.trace import COLUMNS, UNKNOWN, Trace
+
+FINEST, COARSEST = 0.1, 1.0  # s between samples
+STILL = 0.05  # m/s: slower, it stands
+HULL = 1.0  # m over which a course is taken for the heading, where the log has none
+
+
+def report_tracks(
+    mission: Mission,
+    record: Record,
+    *,
+    limits: Mapping[str, float] | None = None,
+    settings: Mapping[str, Any] | None = None,
+) -> Run:
+    """Measure what logs tell (`mission.tracks.read_tracks`) against the plan, as `simulate` measures a run.
+
+    The reasons of `record` fail it, its notes go with it. Where a log has no energy it is reckoned from the vehicle's
+    power at its speed, and where it has no heading from its course. Raises InputError for an unknown limit.
+    """
+    followed = [follow(mission, t) for t in record.tracks]
+    trace, notes = observed_trace(mission, record.tracks, followed)
+    arrived = {t.vehicle for t in record.tracks if np.isfinite(t.arrived)}
+    report = measure(
+        mission,
+        trace,
+        finished=[v.id in arrived for v in mission.vehicles],
+        aground=[False] * len(mission.vehicles),
+        served=served_tasks(mission, record.tracks),
+        limits=limits or {},
+        settings=settings or {},
+        trouble=record.reasons,
+        notes=(*record.notes, *notes),
+    )
+    return Run(trace, report)
+
+
+def missed(mission: Mission, trace: Trace) -> BaseGeometry:
+    """Return what of the area the run left uncovered, or where guards cover unseen, metres.
+
+    Raises InputError if the plan covers nothing.
+    """
+    if mission.method == "guards":
+        return unseen(mission, whole_tracks(trace, TOLERANCE))
+    if mission.spacing is None:
+        raise InputError(f"a plan made by {mission.method!r} covers nothing; it leaves no gaps")
+    lines = [shapely.get_coordinates(line) for line in driven_tracks(trace)]
+    return uncovered(lines, mission.site.coverable, mission.spacing)
+
+
+def observed_trace(mission: Mission, tracks: Sequence[Track], followed: Sequence[Followed]) -> tuple[Trace, list[str]]:
+    """Return the trace of all vehicles at common times, and what had to be reckoned.
+
+    In gaps, before a log's beginning and after its end `kind` is UNKNOWN. After it has come home a vehicle lies there.
+    """
+    usual = [float(np.median(np.diff(t.time))) for t in tracks if len(t.time) > 1]
+    step = float(np.clip(min(usual, default=COARSEST), FINEST, COARSEST))
+    until = max((float(t.time[-1]) for t in tracks), default=0.0)
+    time = np.arange(int(np.ceil(until / step - 1e-9)) + 1) * step
+    vehicles, count = mission.vehicles, len(mission.vehicles)
+    table: dict[str, np.ndarray] = {n: np.zeros((len(time), count), dtype) for n, dtype in COLUMNS.items()}
+    table["kind"][:] = UNKNOWN
+    zones = vehicle_limits(vehicles)["zone"]
+    by_vehicle = {t.vehicle: (t, f) for t, f in zip(tracks, followed, strict=True)}
+    routes = {r.vehicle: r for r in mission.routes}
+    notes = []
+    for i, vehicle in enumerate(vehicles):
+        if vehicle.id not in by_vehicle:
+            table["x"][:, i], table["y"][:, i] = vehicle.start
+            continue
+        track, on = by_vehicle[vehicle.id]
+        reckoned = not np.isfinite(track.energy).any()
+        if reckoned:
+            notes.append(
+                f"{vehicle.id}: no energy in its log; reckoned from the power of {vehicle.model.name} at its speed"
+            )
+        for name, values in _columns(vehicle, routes[vehicle.id], track, on, time, float(zones[i])).items():
+            table[name][:, i] = values
+    return Trace(vehicles=tuple(v.id for v in vehicles), time=time, **table), notes
+
+
+def _columns(
+    vehicle: Vehicle, route: Route, track: Track, on: Followed, time: np.ndarray, zone: float
+) -> dict[str, np.ndarray]:
+    """Return the (t,) columns of one vehicle in the trace."""
+    aerial = vehicle.domain == "aerial" and bool(np.isfinite(track.z).any())
+    heights = track.z if aerial else np.zeros(len(track.time))
+    x, y, z = (_known(time, track.time, a) for a in (track.x, track.y, heights))
+    latest = np.clip(np.searchsorted(track.time, time, side="right") - 1, 0, len(track.time) - 1)
+    coming = np.minimum(latest + 1, len(track.time) - 1)
+    home = time > track.arrived
+    known = (time >= track.time[0]) & (time <= track.time[-1]) & ~(track.broken[coming] & (coming > latest))
+    leg = _wheeled_over(vehicle, route, on.leg[latest], np.column_stack([x, y]))
+    places = np.column_stack([x, y, z]) if aerial else np.column_stack([x, y])
+    along, length, off = off_legs(route, leg, places)
+    beyond = np.maximum(-along, along - length)
+    cross = np.linalg.norm(off, axis=1)
+    if not aerial:  # to port of the leg
+        span = route.xyz[leg, :2] - route.xyz[np.maximum(leg - 1, 0), :2]
+        cross = np.where(span[:, 0] * off[:, 1] < span[:, 1] * off[:, 0], -cross, cross)
+    # Off the line through the leg, as the simulation has it; but far beyond its ends off the leg.
+    cross = np.where(beyond <= zone, cross, np.hypot(cross, beyond))
+    pace = np.hypot(np.gradient(x, time), np.gradient(y, time)) if len(time) > 1 else np.zeros(len(time))
+    speed = _filled(time, track, track.speed, pace)
+    waiting = np.array([w.hold > 0 for w in route.waypoints])
+    holding = (speed < STILL) & (waiting[leg] | waiting[np.maximum(leg - 1, 0)])
+    turning = ((beyond > -zone) & (beyond <= zone)) | holding | home
+    start, end = np.array(vehicle.start), route.xyz[-1, :2]
+    harbour = NEAR * vehicle.model.length
+    near = np.minimum(np.hypot(x - start[0], y - start[1]), np.hypot(x - end[0], y - end[1])) <= harbour
+    codes = np.array([LEGS.index(w.leg) for w in route.waypoints], np.int8)
+    surveying = (route.survey[leg] & ~on.strayed[latest]) | on.elsewhere[latest]
+    kind = np.where(surveying, LEGS.index("survey"), np.where(route.survey[leg], LEGS.index("transit"), codes[leg]))
+    return {
+        "x": x,
+        "y": y,
+        "z": z,
+        "heading": _heading(track, time),
+        "speed": np.where(home, 0.0, speed),
+        "energy": _energy(vehicle, track, time, speed),
+        "cross": np.where(holding | home, 0.0, cross),
+        "leg": leg,
+        "kind": np.where(known | home, kind, UNKNOWN),
+        "turning": turning,
+        "underway": known & ~near & ~home,
+    }
+
+
+def _wheeled_over(vehicle: Vehicle, route: Route, leg: np.ndarray, xy: np.ndarray) -> np.ndarray:
+    """Return (t,) legs with each corner's turn in the leg after it, as the guidance of vessels counts (`guidance.py`)."""
+    if vehicle.domain != "surface" or len(route.waypoints) < 3:
+        return leg
+    limits = vehicle_limits([vehicle])[0]
+    step = np.diff(route.xyz[:, :2], axis=0)
+    length, course = np.hypot(*step.T), np.arctan2(step[:, 1], step[:, 0])
+    half = np.abs((np.diff(course) + np.pi) % (2 * np.pi) - np.pi) / 2
+    radius = max(limits["speed"] / limits["rate"], limits["radius"])
+    turn = radius * np.minimum(np.tan(np.minimum(half, 1.5)), 2.0) + 0.5 * limits["speed"] * np.minimum(2 * half, 1.0)
+    stops = np.array([w.hold > 0 for w in route.waypoints])
+    over = np.zeros(len(route.waypoints))
+    over[1:-1] = np.where(stops[1:-1], -np.inf, np.minimum(turn, 0.5 * np.minimum(length[:-1], length[1:])))
+    over[-1] = -np.inf
+    along, whole, _ = off_legs(route, leg, xy)
+    return leg + (whole - along <= over[leg])
+
+
+def _known(when: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return values at `when` from those that are not NaN."""
+    sure = np.isfinite(values)
+    return np.interp(when, time[sure], values[sure])
+
+
+def _filled(when: np.ndarray, track: Track, values: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
+    """Return the log's values at `when`, or, where it has none, others."""
+    return _known(when, track.time, values) if np.isfinite(values).any() else otherwise
+
+
+def _heading(track: Track, time: np.ndarray) -> np.ndarray:
+    """Return (t,) radians: as logged, or else the course over at least HULL metres."""
+    if np.isfinite(track.heading).any():
+        return _known(time, track.time, track.heading)
+    step = np.hypot(np.diff(track.x), np.diff(track.y))
+    way = np.r_[0.0, np.cumsum(step)]
+    whole = np.floor(way / HULL)
+    kept = np.flatnonzero(np.r_[True, np.diff(whole) > 0])
+    if len(kept) < 2:
+        return np.zeros(len(time))
+    course = np.unwrap(np.arctan2(np.diff(track.y[kept]), np.diff(track.x[kept])))
+    middle = (track.time[kept[:-1]] + track.time[kept[1:]]) / 2
+    return np.interp(time, middle, course)
+
+
+def _energy(vehicle: Vehicle, track: Track, time: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """Return (t,) Wh used: as logged, or else what the model draws at its speed."""
+    if np.isfinite(track.energy).any():
+        return _known(time, track.time, track.energy)
+    under = (time >= track.time[0]) & (time <= track.time[-1])
+    model = vehicle.model
+    share = np.maximum(speed / model.speed, 0.0) ** model.power_exponent
+    power = np.where(under, model.power_idle + (model.power_cruise - model.power_idle) * share, 0.0)
+    return np.r_[0.0, np.cumsum(power[1:] * np.diff(time))] / 3600.0

@@ -1,0 +1,94 @@
+"""`quarterdeck report`: measure a real mission from its logs, as `simulate` measures a virtual one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from quarterdeck.cli.output import console, emit, force_option, not_there, print_reason
+from quarterdeck.cli.simulate import Limit, print_report
+
+if TYPE_CHECKING:
+    from quarterdeck.mission.mission import Mission
+    from quarterdeck.physics.simulate import Run
+
+
+@click.command(short_help="Measure a real mission from its logs.")
+@click.argument("plan")
+@click.option("--track", "tracks", metavar="[VEHICLE=]FILE", multiple=True, required=True,
+              help="A log: .bin, .tlog, .gpx, .csv, or a trace of simulate; repeatable. See docs/logs.md.")  # fmt: skip
+@click.option("--start", metavar="TIME", help="When the mission began, such as 2026-06-01T12:00:00Z; default: by the logs.")
+@click.option("--report", metavar="FILE", callback=not_there, help="Write the report as JSON.")
+@click.option(
+    "--gaps", metavar="FILE", callback=not_there, help="Write what was left uncovered as a site to plan (GeoJSON)."
+)
+@click.option("--rrd", metavar="FILE", callback=not_there, help="Record the mission for rerun.")
+@click.option("--picture", metavar="FILE", callback=not_there, help="Draw plan, tracks and misses as a PNG.")
+@click.option(
+    "--limit", "limits", type=Limit(), multiple=True, help="A limit of the verdict; repeatable. See docs/simulation.md."
+)
+@click.option("--json", "as_json", is_flag=True, help="Write the report as JSON to standard output.")
+@force_option
+def command(
+    plan: str,
+    tracks: tuple[str, ...],
+    start: str | None,
+    report: str | None,
+    gaps: str | None,
+    rrd: str | None,
+    picture: str | None,
+    limits: tuple[tuple[str, float], ...],
+    as_json: bool,
+    force: bool,
+) -> int:
+    """Measure what really happened of PLAN (a file, or - for standard input), by the logs of its vehicles.
+
+    Exit status 1 if the verdict fails, or a log is not of this plan.
+    """
+    from datetime import UTC, datetime
+
+    from quarterdeck.geo.logs import read_time
+    from quarterdeck.mission.planfile import read_plan
+    from quarterdeck.mission.tracks import read_tracks
+    from quarterdeck.physics.observed import report_tracks
+
+    mission = read_plan(plan)
+    record = read_tracks(mission, tracks, start=read_time(start) if start else None)
+    began = None if record.start is None else datetime.fromtimestamp(record.start, UTC).isoformat()
+    run = report_tracks(mission, record, limits=dict(limits), settings={"tracks": list(tracks), "start": began})
+    if report:
+        emit(run.report.to_json(), report, force=force)
+    if rrd:
+        from quarterdeck.exporters.recording import recording
+
+        emit(recording(mission, run.trace), rrd, force=force)
+    if picture:
+        from quarterdeck.exporters.picture import picture as draw
+
+        emit(draw(mission, run.trace, run.report), picture, force=force)
+    if as_json:
+        emit(run.report.to_json(), "-", force=force)
+    print_report(mission, run.report, how="as driven")
+    if gaps:
+        _write_gaps(mission, run, gaps, force)
+    return 0 if run.report.passed else 1
+
+
+def _write_gaps(mission: Mission, run: Run, gaps: str, force: bool) -> None:
+    """Write what was left uncovered, and tell what of it is not worth a track."""
+    from quarterdeck.geo.writer import site_text
+    from quarterdeck.mission.gaps import SLIVER, gap_site
+    from quarterdeck.physics.observed import missed
+
+    site, slivers = gap_site(mission, missed(mission, run.trace))
+    screen = console()
+    if site.site.areas:
+        emit(site_text(site), gaps, force=force)
+        area = sum(a.polygon.area for a in site.site.areas)
+        print_reason(screen, "gaps", f"{len(site.site.areas)} of {area:,.0f} m2 in all: {gaps}")
+    else:
+        print_reason(screen, "gaps", f"none; {gaps} is not written")
+    if slivers.area > 0:
+        narrow = f"{SLIVER:g} of the {'spacing' if mission.spacing else 'range'}"
+        print_reason(screen, "gaps", f"{slivers.area:,.0f} m2 in slivers narrower than {narrow} are left out")
