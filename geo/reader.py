@@ -1,7 +1,7 @@
 """From a site's GeoJSON to a `Scenario`: everything is checked here, once, and every problem told with its place."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -42,17 +42,18 @@ def read_scenario(source: str | Path | Document) -> Scenario:
     return _scenario(source, None)
 
 
-def read_additions(source: str | Path | Document, frame: Frame) -> Scenario:
+def read_additions(source: str | Path | Document, frame: Frame, *, tasks: Collection[str] = ()) -> Scenario:
     """Return what a GeoJSON file adds to a mission, in metres of its `frame`: any roles, none required.
 
-    Raises InputError as `read_scenario` does.
+    New tasks may come after those of the ids `tasks`. Features that change something else are passed over (see
+    `mission.changes`). Raises InputError as `read_scenario` does.
     """
-    return _scenario(source, frame)
+    return _scenario(source, frame, tasks)
 
 
-def _scenario(source: str | Path | Document, frame: Frame | None) -> Scenario:
+def _scenario(source: str | Path | Document, frame: Frame | None, tasks: Collection[str] = ()) -> Scenario:
     document = opened(source)
-    scenario, problems = _read(document, frame)
+    scenario, problems = _read(document, frame, tasks)
     if scenario is None:
         more = f" (and {len(problems) - 1} more; `quarterdeck check` lists them)" if len(problems) > 1 else ""
         raise InputError(f"{document.name}: {problems[0]}{more}")
@@ -78,11 +79,26 @@ def read_obstacles(source: str | Path, frame: Frame) -> tuple[Obstacle, ...]:
     return obstacles
 
 
-def _read(document: Document, frame: Frame | None = None) -> tuple[Scenario | None, list[str]]:
+def added(raw: Any) -> bool:
+    """Whether a feature of a file of changes adds something, and changes or removes nothing."""
+    properties = raw.get("properties") if isinstance(raw, dict) else None
+    return not isinstance(properties, dict) or properties.get("change") in (None, "add")
+
+
+def _read(
+    document: Document, frame: Frame | None = None, others: Collection[str] = ()
+) -> tuple[Scenario | None, list[str]]:
     """Return the scenario, or None, and all problems found; with a `frame` given, nothing in particular is required."""
     content = document.content
     problems: list[str] = []
-    features = [f for i, raw in enumerate(content["features"]) if (f := _feature(i, raw, problems))]
+    counted = [(i, raw) for i, raw in enumerate(content["features"]) if frame is None or added(raw)]
+    features = [f for i, raw in counted if (f := _feature(i, raw, problems))]
+    if frame is None:
+        problems += [
+            f'{f["place"]}: "change" belongs into a file for `quarterdeck replan --changes`; a site has none'
+            for f in features
+            if f["properties"].get("change") is not None
+        ]
     required = ("area", "task", "casualty") if frame is None else tuple(GEOMETRIES)
     if not any(f["role"] in required for f in features) and not problems:
         problems.append('no feature has the role "area" or "task"; give the polygon to be covered "role": "area"')
@@ -122,7 +138,7 @@ def _read(document: Document, frame: Frame | None = None) -> tuple[Scenario | No
     )
     problems += _area_problems(features)
     problems += _vehicle_problems(features, scenario)
-    problems += _task_problems(scenario)
+    problems += _task_problems(scenario, others)
     return (None if problems else scenario), problems
 
 
@@ -359,9 +375,10 @@ def _vehicle_problems(features: Sequence[dict[str, Any]], scenario: Scenario) ->
     return problems
 
 
-def _task_problems(scenario: Scenario) -> list[str]:
+def _task_problems(scenario: Scenario, others: Collection[str]) -> list[str]:
     ids = [t.id for t in scenario.tasks]
     problems = [f"task {i!r}: its id is given twice" for i in sorted({i for i in ids if ids.count(i) > 1})]
+    ids += others
     for task in scenario.tasks:
         for before in task.after:
             if before.task not in ids:

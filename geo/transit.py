@@ -101,6 +101,11 @@ def shortest_paths(
     return lengths, paths
 
 
+def straight(road: Roadmap, sources: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    """Return (n,) bool: the straight way from each of (n, 2) sources to its target is clear, and so the shortest."""
+    return np.asarray(shapely.covers(road.grown, shapely.linestrings(np.stack([sources, targets], axis=1))))
+
+
 def _enter(road: Roadmap, point: np.ndarray) -> tuple[float, float]:
     """Return the point, or the nearest one inside."""
     if road.grown.covers(Point(point)):

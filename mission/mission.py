@@ -85,7 +85,8 @@ class Mission:
 
     `method` and `parameters` say how it was made, `figures` what it comes to, `bounds` what nothing could beat. `reasons`
     say, one line each, why it is infeasible; it is feasible when there are none. `spacing` is the track spacing in metres
-    (None where nothing is covered by swaths); `layers` is for the eye.
+    (None where nothing is covered by swaths); `layers` is for the eye. `lost` are vehicles that were given up, as they were
+    then: where they were last, with the energy that they had.
     """
 
     name: str
@@ -105,6 +106,7 @@ class Mission:
     layers: tuple[Layer, ...] = ()
     input_hash: str = ""
     version: str = ""
+    lost: tuple[Vehicle, ...] = ()
 
     @property
     def feasible(self) -> bool:

@@ -93,12 +93,13 @@ def _site(mission: Mission) -> list[dict[str, Any]]:
 def _fleet(mission: Mission) -> list[dict[str, Any]]:
     frame = mission.frame
     features = []
-    for v, colour in zip(mission.vehicles, colours(len(mission.vehicles)), strict=True):
+    fleet = [*(("vehicle", v) for v in mission.vehicles), *(("lost", v) for v in mission.lost)]
+    for (role, v), colour in zip(fleet, colours(len(fleet)), strict=True):
         given: dict[str, Any] = {"model": _plain(asdict(v.model))} | {n: getattr(v, n) for n in VEHICLE_FIGURES}
         given |= {"ceiling": v.ceiling, "ceiling_amsl": v.ceiling_amsl} if v.domain == "aerial" else {}
         given |= {"sensor": asdict(v.sensor) if v.sensor else None, "can": sorted(v.can), "returns": v.returns}
         given |= {"end": position(frame, v.end) if v.end else None, "marker-color": colour}
-        features.append(point_feature(frame, "vehicle", v.start, v.id, **_plain(given)))
+        features.append(point_feature(frame, role, v.start, v.id, **_plain(given)))
     for t in mission.tasks:
         given = {k: v for k, v in asdict(t).items() if k not in ("id", "position")} | {"needs": sorted(t.needs)}
         features.append(point_feature(frame, "task", t.position, t.id, **_plain(given)))
@@ -228,6 +229,7 @@ def _mission(name: str, header: dict[str, Any], features: list[dict[str, Any]]) 
         layers=tuple(Layer(n, tuple(g for g, _ in items), tuple(p for _, p in items)) for n, items in layers.items()),
         input_hash=header["input_hash"],
         version=header["version"],
+        lost=tuple(_vehicle(f, frame) for f in of("lost")),
     )
     _check_types(mission)
     return mission
@@ -258,6 +260,7 @@ def _check_properties(features: list[dict[str, Any]]) -> None:
     """Raise ValueError where the figures of a site's feature would be refused in a site too."""
     for f in features:
         given, role = f["properties"], f["properties"].get("role")
+        role = "vehicle" if role == "lost" else role
         if role not in PROPERTIES:
             continue
         # Models stand in a PLAN whole, windows may be open, and what keeps to the surface has the altitude 0.

@@ -9,11 +9,12 @@ from shapely import Point
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Obstacle
+from quarterdeck.mission.changes import Changes
 from quarterdeck.mission.director import Command, Director, Event, State
 from quarterdeck.mission.inspection import default_director
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.progress import Progress, surveyed
-from quarterdeck.mission.replan import Changes, replan
+from quarterdeck.mission.replan import replan
 
 ROOM = 3.0  # lengths kept from a vehicle that stands still, as vehicles keep from each other
 

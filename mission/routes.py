@@ -8,7 +8,7 @@ from shapely.ops import substring
 
 from quarterdeck.coverage.metrics import straight_pieces
 from quarterdeck.geo.scenario import Vehicle
-from quarterdeck.geo.transit import Roadmap, shortest_paths
+from quarterdeck.geo.transit import Roadmap, shortest_paths, straight
 from quarterdeck.mission.corners import driven, with_turns
 from quarterdeck.mission.mission import Leg, Route, unbroken
 from quarterdeck.mission.timing import shortfalls, timed_route
@@ -84,8 +84,12 @@ def way_routes(
 def _linked(vehicle: Vehicle, lines: Sequence[np.ndarray], road: Roadmap) -> tuple[np.ndarray, list[Leg], list[str]]:
     """Return (n, 2) metres from the start along survey lines (m, 2) in order and home, the kind of each leg, what fails."""
     points, legs, missing = [np.array([vehicle.start])], ["start"], []  # type: list[np.ndarray], list[Leg], list[str]
-    for line in lines:
-        way = shortest_paths(road, points[-1][-1], line[0])[1][0][0]
+    ends = [np.array(vehicle.start), *(line[-1] for line in lines)]
+    clear = straight(road, np.array(ends[:-1]), np.array([line[0] for line in lines])) if lines else np.empty(0)
+    for line, end, seen in zip(lines, ends, clear.tolist(), strict=False):
+        here = points[-1][-1]
+        direct = seen and (here == end).all()
+        way = np.array([here, line[0]]) if direct else shortest_paths(road, here, line[0])[1][0][0]
         if way is None:
             missing.append(f"{vehicle.id}: no way from its start to its region; move the start, or lessen its clearance")
             continue

@@ -1,141 +1,255 @@
 """Sharing survey lines out among vehicles that are under way, so that all are done at about the same time."""
 
 from collections.abc import Sequence
-from itertools import pairwise
+from dataclasses import dataclass
 
 import numpy as np
-import shapely
-from shapely import LineString
-from shapely.geometry.base import BaseGeometry
-from shapely.ops import substring
 
 from quarterdeck.geo.scenario import Vehicle
 
-SPECK = 1e-3  # m: a shorter line is a rounding error
-ROUNDS = 24  # of bisection: the level is found to a ten-millionth of the first guess
+CLOSE = 1e-3  # of the level of finishing times: nearer to the least one than this is near enough
 
 
-def remaining_parts(line: np.ndarray, done: BaseGeometry, reach: BaseGeometry | None = None) -> list[np.ndarray]:
-    """Return the parts of an (n, 2) line outside `done` and, where given, inside `reach`, in the order of the line.
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A survey line: (n, 2) `points` in metres, `along` (n,) the metres up to each, `able` (k,) bool: who can get there."""
 
-    Worked out leg by leg: a line may cross itself, and run out and back on itself.
+    points: np.ndarray
+    along: np.ndarray
+    able: np.ndarray
+
+    @property
+    def length(self) -> float:
+        """Metres."""
+        return float(self.along[-1])
+
+    @property
+    def backwards(self) -> "Line":
+        """The same line from its other end."""
+        return Line(self.points[::-1], self.along[-1] - self.along[::-1], self.able)
+
+    def part(self, start: float, end: float) -> "Line":
+        """Return the part between two distances along the line, in metres."""
+        ends = np.array([[np.interp(at, self.along, c) for c in self.points.T] for at in (start, end)])
+        inner = self.points[(self.along > start) & (self.along < end)]
+        return line_of(np.vstack([ends[:1], inner, ends[1:]]), self.able)
+
+
+def line_of(points: np.ndarray, able: np.ndarray) -> Line:
+    """Return the line along (n, 2) points that the vehicles of `able` (k,) bool can get to."""
+    points = np.asarray(points, dtype=float)
+    return Line(points, np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T))), able)
+
+
+@dataclass(frozen=True, slots=True)
+class Team:
+    """k vehicles: `here` and `homes` (k, 2) metres (NaN: stays where its last line ends), `speeds` (k,) m/s between lines,
+    `paces` (k,) seconds a metre of line, turns and all, `spent` (k,) seconds before its first line, `limits` (k,) seconds
+    that it can be out.
     """
-    legs = shapely.difference(shapely.linestrings(np.stack([line[:-1], line[1:]], axis=1)), done)
-    legs = legs if reach is None else shapely.intersection(legs, reach)
-    parts: list[list[np.ndarray]] = []
-    for (a, b), leg in zip(pairwise(line), legs, strict=True):
-        pieces = [
-            np.array(g.coords) for g in getattr(leg, "geoms", [leg]) if g.geom_type == "LineString" and not g.is_empty
-        ]
-        pieces = [p if np.dot(p[-1] - p[0], b - a) >= 0 else p[::-1] for p in pieces]
-        for piece in sorted(pieces, key=lambda p: float(np.dot(p[0] - a, b - a))):
-            if parts and np.allclose(parts[-1][-1], piece[0], atol=1e-6):
-                parts[-1].extend(piece[1:])
-            else:
-                parts.append(list(piece))
-    return [np.array(p) for p in parts]
+
+    here: np.ndarray
+    homes: np.ndarray
+    speeds: np.ndarray
+    paces: np.ndarray
+    spent: np.ndarray
+    limits: np.ndarray
+
+    def home(self, i: int, points: np.ndarray) -> np.ndarray:
+        """Return the seconds home of vehicle i from (..., 2) places."""
+        if np.isnan(self.homes[i, 0]):
+            return np.zeros(np.shape(points)[:-1])
+        away = points - self.homes[i]
+        return np.asarray(np.hypot(away[..., 0], away[..., 1]) / self.speeds[i])
 
 
-def share_out(
-    vehicles: Sequence[Vehicle], own: Sequence[Sequence[np.ndarray]], released: Sequence[np.ndarray], *, crumb: float
-) -> list[list[np.ndarray]]:
-    """Return each vehicle's (n, 2) lines in metres: its own in order, less what it gives away, then what it takes over.
+def team_of(vehicles: Sequence[Vehicle], paces: np.ndarray, spent: np.ndarray, limits: np.ndarray) -> Team:
+    """Return vehicles that set out from their starts; `paces`, `spent` and `limits` (k,) as in `Team`."""
+    homes = np.array([v.home if v.returns else (np.nan, np.nan) for v in vehicles])
+    return Team(np.array([v.start for v in vehicles]), homes, np.array([v.speed for v in vehicles]), paces, spent, limits)
+
+
+@dataclass(frozen=True, slots=True)
+class Shares:
+    """What each vehicle drives, in order, the seconds (k,) that it is out, by straight ways, and what nobody can do."""
+
+    lines: list[list[Line]]
+    times: np.ndarray
+    left: list[Line]
+
+
+def share_out(team: Team, own: Sequence[Sequence[Line]], released: Sequence[Line], *, crumb: float) -> Shares:
+    """Return each vehicle's lines: its own in order, less what it gives away, then what it takes over.
 
     The least level of finishing times is sought, by bisection, at which what those above it give away, and the released
-    lines, fit into the time of those below it. No piece is cut shorter than `crumb` metres.
+    lines, fit into the time of those below it. Nobody is out for longer than its limit; what does not fit is left. No piece
+    is cut shorter than `crumb` metres.
     """
-    least = float(crumb)
-    if not any(len(o) for o in own) and not released:
-        return [[] for _ in vehicles]
-    slowest = min(v.speed for v in vehicles)
-    everything = [*released, *(line for lines in own for line in lines)]
-    reach = shapely.total_bounds([LineString(line) for line in everything] + [shapely.Point(v.start) for v in vehicles])
-    across = float(np.hypot(reach[2] - reach[0], reach[3] - reach[1]))
-    high = (sum(_length(line) for line in everything) + (len(everything) + 2) * across) / slowest
-    low, best = 0.0, None
-    for _ in range(ROUNDS):
-        level = (low + high) / 2 if best is not None else high
-        shared = _shared_at(level, vehicles, own, released, least)
-        if shared is None:
-            low, high = level, high if best is not None else 2 * high
+    prefixes = [_prefix(team, i, lines) for i, lines in enumerate(own)]
+    most = _shared_at(np.inf, team, own, prefixes, released, crumb)
+    if most.left:
+        return most
+    low, high = float(min(team.limits.max(), _least(team, own, released))), float(most.times.max())
+    best = most
+    while high - low > CLOSE * high:
+        level = (low + high) / 2
+        shared = _shared_at(level, team, own, prefixes, released, crumb)
+        if shared.left or shared.times.max() > level * (1 + 1e-9):
+            low = level
         else:
-            high, best = level, shared
-    if best is None:
-        raise RuntimeError("survey lines could not be shared out")
+            best, high = shared, float(shared.times.max())
     return best
+
+
+def _least(team: Team, own: Sequence[Sequence[Line]], released: Sequence[Line]) -> float:
+    """Return seconds below which nothing can be: all work shared by all, without any way to it."""
+    metres = sum(line.length for lines in [*own, released] for line in lines)
+    return float((metres + (team.spent / team.paces).sum()) / (1 / team.paces).sum()) if metres else 0.0
+
+
+def _prefix(team: Team, i: int, lines: Sequence[Line]) -> np.ndarray:
+    """Return (n + 1,) seconds after which vehicle i has driven its first 0, 1, ... n lines."""
+    if not lines:
+        return np.array([team.spent[i]])
+    firsts, lasts = np.array([x.points[0] for x in lines]), np.array([x.points[-1] for x in lines])
+    ways = np.hypot(*(firsts - np.vstack([team.here[i], lasts[:-1]])).T) / team.speeds[i]
+    drives = np.array([x.length for x in lines]) * team.paces[i]
+    return np.asarray(team.spent[i] + np.append(0.0, np.cumsum(ways + drives)))
 
 
 def _shared_at(
     level: float,
-    vehicles: Sequence[Vehicle],
-    own: Sequence[Sequence[np.ndarray]],
-    released: Sequence[np.ndarray],
-    least: float,
-) -> list[list[np.ndarray]] | None:
-    """Return the lines if all can be done within `level` seconds, or None."""
-    lines, pool = [list(o) for o in own], list(released)
-    for vehicle, mine in zip(vehicles, lines, strict=True):
-        pool += _given_away(vehicle, mine, level, least)
-    for i in sorted(range(len(vehicles)), key=lambda i: _time(vehicles[i], lines[i])):
-        _take(vehicles[i], lines[i], pool, level, least)
-    return lines if not pool else None
+    team: Team,
+    own: Sequence[Sequence[Line]],
+    prefixes: Sequence[np.ndarray],
+    released: Sequence[Line],
+    crumb: float,
+) -> Shares:
+    """Return the lines such that, as far as can be, all is done within `level` seconds."""
+    pool, lines, here, spent = list(released), [], team.here.copy(), team.spent.copy()
+    levels = np.minimum(level, team.limits)
+    for i, mine in enumerate(own):
+        kept, given, spent[i] = _kept(team, i, mine, prefixes[i], levels[i], crumb)
+        pool += given
+        lines.append(kept)
+        here[i] = kept[-1].points[-1] if kept else here[i]
+    left = _taken(levels, team, lines, here, spent, pool, crumb)
+    home = np.array([float(team.home(i, here[i])) for i in range(len(lines))])
+    return Shares(lines, spent + home, left)
 
 
-def _given_away(vehicle: Vehicle, mine: list[np.ndarray], level: float, least: float) -> list[np.ndarray]:
-    """Cut from the end of a vehicle's lines what it cannot do within `level`; return it."""
-    given = []
-    while mine and (excess := (_time(vehicle, mine) - level) * vehicle.speed) > 0:
-        line = LineString(mine[-1])
-        if line.length - excess < least:
-            given.append(mine.pop())
+def _kept(
+    team: Team, i: int, mine: Sequence[Line], prefix: np.ndarray, level: float, crumb: float
+) -> tuple[list[Line], list[Line], float]:
+    """Return what vehicle i does of its own lines within `level` seconds, what it gives away, and the seconds it takes."""
+    if not mine:
+        return [], [], float(prefix[0])
+    done = prefix[1:] + team.home(i, np.array([line.points[-1] for line in mine]))
+    over = np.flatnonzero(done > level)
+    if not len(over):
+        return list(mine), [], float(prefix[-1])
+    first = int(over[0])
+    line = mine[first]
+    begun = prefix[first + 1] - line.length * team.paces[i]
+    cut = _cut(team, i, line, level - begun, crumb)
+    if cut == 0.0:
+        return list(mine[:first]), list(mine[first:]), float(prefix[first])
+    kept, rest = line.part(0.0, cut), line.part(cut, line.length)
+    return [*mine[:first], kept], [rest, *mine[first + 1 :]], float(begun + cut * team.paces[i])
+
+
+def _cut(team: Team, i: int, line: Line, room: float, crumb: float) -> float:
+    """Return the metres of a line that vehicle i can drive and be home within `room` seconds; 0 if too few."""
+    if line.length < 2 * crumb:
+        return 0.0
+    seconds = line.along * team.paces[i] + team.home(i, line.points)
+    if seconds[0] > room:
+        return 0.0
+    at = int(np.argmax(seconds > room))
+    low, high = line.along[at - 1], line.along[at]
+    a, b = line.points[at - 1], line.points[at]
+    while high - low > 0.01 * crumb:
+        middle = (low + high) / 2
+        place = a + (b - a) * (middle - line.along[at - 1]) / (line.along[at] - line.along[at - 1])
+        if middle * team.paces[i] + float(team.home(i, place)) > room:
+            high = middle
         else:
-            cut = min(line.length - excess, line.length - least)
-            if cut < least:
-                given.append(mine.pop())
-                continue
-            given.append(_part(line, cut, line.length))
-            mine[-1] = _part(line, 0.0, cut)
-            break
-    return given
+            low = middle
+    cut = float(min(low, line.length - crumb))
+    return cut if cut >= crumb else 0.0
 
 
-def _take(vehicle: Vehicle, mine: list[np.ndarray], pool: list[np.ndarray], level: float, least: float) -> None:
-    """Move from the pool to a vehicle's lines, nearest end first, what it can do within `level`."""
-    while pool:
-        here = mine[-1][-1] if mine else np.array(vehicle.start)
-        ends = np.array([[np.hypot(*(p[0] - here)), np.hypot(*(p[-1] - here))] for p in pool])
-        chosen, end = np.unravel_index(int(ends.argmin()), ends.shape)
-        piece = pool[chosen] if end == 0 else pool[chosen][::-1]
-        room = level * vehicle.speed
-        whole = _time(vehicle, [*mine, piece]) * vehicle.speed
-        line = LineString(piece)
-        if whole <= room:
-            mine.append(piece)
-            pool.pop(chosen)
+def _taken(
+    levels: np.ndarray,
+    team: Team,
+    lines: list[list[Line]],
+    here: np.ndarray,
+    spent: np.ndarray,
+    pool: list[Line],
+    crumb: float,
+) -> list[Line]:
+    """Move lines from the pool to vehicles that can do them within their levels; whoever is first done, the nearest to it.
+
+    `lines`, `here` and `spent` are brought up to date. Returns what is left.
+    """
+    if not pool:
+        return []
+    k = len(lines)
+    ends = np.array([[line.points[0], line.points[-1]] for line in pool])
+    able = np.array([line.able for line in pool])
+    lengths = np.array([line.length for line in pool])
+    there = np.ones(len(pool), dtype=bool)
+    busy = spent + np.array([float(team.home(i, here[i])) for i in range(k)])
+    while there.any() and np.isfinite(busy).any():
+        i = int(np.argmin(busy))
+        mine = np.flatnonzero(there & able[:, i])
+        way = np.hypot(ends[mine, :, 0] - here[i, 0], ends[mine, :, 1] - here[i, 1]) / team.speeds[i]
+        drive = lengths[mine, None] * team.paces[i]
+        done = spent[i] + way + drive + team.home(i, ends[mine][:, ::-1])
+        fits = done <= levels[i]
+        if fits.any():
+            chosen, end = divmod(int(np.where(fits, way, np.inf).argmin()), 2)
+            number = int(mine[chosen])
+            nearer = way < way[chosen, end] - 1e-9
+            partial = _first_cut(team, i, pool, mine, way, nearer, levels[i] - spent[i], crumb)
+        else:
+            number, end, nearer = -1, 0, np.ones_like(way, dtype=bool)
+            partial = _first_cut(team, i, pool, mine, way, nearer, levels[i] - spent[i], crumb) if len(mine) else None
+        if partial is not None:  # a nearer line fits in part: the last that it does
+            number, end, cut = partial
+            line = pool[number].backwards if end else pool[number]
+            piece, pool[number] = line.part(0.0, cut), line.part(cut, line.length)
+            ends[number] = pool[number].points[0], pool[number].points[-1]
+            lengths[number] = pool[number].length
+        elif number >= 0:
+            piece = pool[number].backwards if end else pool[number]
+            there[number] = False
+        else:
+            busy[i] = np.inf
             continue
-        cut = line.length - (whole - room) / 2  # what is not driven there is not driven back from either, at the most
-        while cut >= least and _time(vehicle, [*mine, _part(line, 0.0, cut)]) * vehicle.speed > room:
-            cut -= max(least / 2, 0.05 * line.length)
-        if cut < least or line.length - cut < least:
-            return
-        mine.append(_part(line, 0.0, cut))
-        pool[chosen] = _part(line, cut, line.length)
-        return
+        spent[i] += float(np.hypot(*(piece.points[0] - here[i]))) / team.speeds[i] + piece.length * team.paces[i]
+        lines[i].append(piece)
+        here[i] = piece.points[-1]
+        busy[i] = np.inf if partial is not None else spent[i] + float(team.home(i, here[i]))
+    return [line for line, left in zip(pool, there, strict=True) if left]
 
 
-def _time(vehicle: Vehicle, lines: Sequence[np.ndarray]) -> float:
-    """Return the seconds along straight ways over the lines and home: what the balance goes by."""
-    here, metres = np.array(vehicle.start), 0.0
-    for line in lines:
-        metres += float(np.hypot(*(line[0] - here))) + _length(line)
-        here = line[-1]
-    home = float(np.hypot(*(np.array(vehicle.home) - here))) if vehicle.returns else 0.0
-    return (metres + home) / vehicle.speed
-
-
-def _length(line: np.ndarray) -> float:
-    return float(np.hypot(*np.diff(line, axis=0).T).sum())
-
-
-def _part(line: LineString, start: float, end: float) -> np.ndarray:
-    return np.array(substring(line, start, end).coords)
+def _first_cut(
+    team: Team,
+    i: int,
+    pool: Sequence[Line],
+    mine: np.ndarray,
+    way: np.ndarray,
+    nearer: np.ndarray,
+    room: float,
+    crumb: float,
+) -> tuple[int, int, float] | None:
+    """Return the nearest line of which vehicle i can do a part: its number, which end first, how many metres; or None."""
+    order = np.argsort(np.where(nearer, way, np.inf), axis=None, kind="stable")[: int(nearer.sum())]
+    for flat in order[:4].tolist():
+        chosen, end = divmod(flat, 2)
+        line = pool[int(mine[chosen])]
+        cut = _cut(team, i, line.backwards if end else line, room - way[chosen, end], crumb)
+        if cut > 0.0:
+            return int(mine[chosen]), end, cut
+    return None

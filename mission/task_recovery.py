@@ -1,6 +1,10 @@
 """An inspection mission from now on: the tasks not yet done, shared out anew among whoever works, from where they are."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
+
+import numpy as np
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Scenario, Task
@@ -11,6 +15,8 @@ from quarterdeck.mission.progress import Progress
 from quarterdeck.mission.routes import line_routes
 
 GENERATIONS = 30  # of the search: robots are waiting
+HABITS = ("objective", "weights", "shape", "shape_parameters", "tiers")  # of a plan that hold for what is left of it too
+THERE = 1.0  # m beyond its clearance: a vehicle so near to where it serves a task is there
 
 
 def assign_from_now(mission: Mission, scenario: Scenario, progress: Progress, *, seed: int = 0) -> Mission:
@@ -18,37 +24,87 @@ def assign_from_now(mission: Mission, scenario: Scenario, progress: Progress, *,
 
     `scenario` is the world as it is now: the vehicles that work, each with its start where it is and the energy that it has
     left, and every task, done or not. Predecessors that are done bind no more, but a task in the `same_robot` as one that
-    is done is kept to that robot. What nobody can do any more is left out, with what comes after it, and told.
+    is done is kept to that robot; a service that is under way is finished by the robot that began it. What nobody can do
+    any more is left out of the routes, with what comes after it, and told; it stays among the mission's tasks.
     """
-    doer = {w.task: r.vehicle for r in mission.routes for w in r.waypoints if w.task in progress.served}
     vehicles = tuple(replace(v, can=v.can | {_itself(v.id)}) for v in scenario.vehicles)
-    left = [_freed(t, doer, progress.time) for t in scenario.tasks if t.id not in progress.served]
-    reasons: list[str] = []
+    tasks = tasks_left(mission, scenario.tasks, progress, {v.id for v in scenario.vehicles})
+    left, reasons, undone = list(tasks), [], []
     while left:
         try:
-            after = assign(replace(scenario, vehicles=vehicles, tasks=tuple(left)), iterations=GENERATIONS, seed=seed)
+            after = assign(
+                replace(scenario, vehicles=vehicles, tasks=tuple(left)),
+                iterations=GENERATIONS,
+                seed=seed,
+                **_habits(mission.parameters),
+            )
         except InputError as error:
             lost = next((t for t in left if str(error).startswith(f"task {t.id!r}:")), None)
             if lost is None:
                 raise
             gone = _with_successors(lost.id, left)
             reasons += [str(error), *(f"task {i!r}: comes after {lost.id!r}" for i in sorted(gone - {lost.id}))]
+            undone += [t.id for t in left if t.id in gone]
             left = [t for t in left if t.id not in gone]
             continue
-        return replace(after, vehicles=scenario.vehicles, parameters=mission.parameters, reasons=(*reasons, *after.reasons))
+        return replace(
+            after,
+            vehicles=scenario.vehicles,
+            tasks=tasks,
+            figures={**after.figures, "undone": undone},
+            reasons=(*reasons, *after.reasons),
+        )
     routes, missing = line_routes(scenario.vehicles, [[] for _ in vehicles], roadmaps(scenario))
     return replace(
         mission,
         site=scenario.site,
         vehicles=scenario.vehicles,
         routes=routes,
-        tasks=(),
-        seed=seed,
-        figures={"makespan": max(r.duration for r in routes), "energy": sum(r.energy for r in routes)},
+        tasks=tasks,
+        figures={
+            "makespan": max(r.duration for r in routes),
+            "energy": sum(r.energy for r in routes),
+            "undone": undone,
+        },
         bounds={},
         reasons=(*reasons, *missing),
         layers=(),
     )
+
+
+def _habits(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: parameters[name] for name in HABITS if name in parameters}
+
+
+def tasks_left(mission: Mission, tasks: Sequence[Task], progress: Progress, working: set[str]) -> tuple[Task, ...]:
+    """Return the tasks that are not done as they are from now on; `working` are the ids of the vehicles that go on."""
+    doer = {w.task: r.vehicle for r in mission.routes for w in r.waypoints if w.task in progress.served}
+    old = {t.id: t for t in mission.tasks}
+    begun = {t: b for t, b in _under_way(mission, progress).items() if b[0] in working and t not in progress.served}
+    left = []
+    for task in tasks:
+        if task.id in progress.served:
+            continue
+        if task.id in begun:
+            vehicle, seconds = begun[task.id]
+            service = max(0.0, seconds + task.service_time - old[task.id].service_time)
+            needs = task.needs | {_itself(vehicle)}
+            left.append(replace(task, service_time=service, needs=needs, after=(), window=(0.0, float("inf"))))
+        else:
+            left.append(_freed(task, doer, progress.time))
+    return tuple(left)
+
+
+def _under_way(mission: Mission, progress: Progress) -> dict[str, tuple[str, float]]:
+    """Return the tasks whose service has begun: by which vehicle, and how many seconds are left of it."""
+    found = {}
+    for route in mission.routes:
+        x, y, _ = progress.positions[route.vehicle]
+        near = THERE + mission.vehicle(route.vehicle).clearance
+        for w in route.waypoints:
+            if w.task and w.time <= progress.time < w.time + w.hold and np.hypot(w.x - x, w.y - y) <= near:
+                found[w.task] = (route.vehicle, w.time + w.hold - progress.time)
+    return found
 
 
 def _itself(vehicle: str) -> str:

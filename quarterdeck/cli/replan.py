@@ -6,10 +6,11 @@ from quarterdeck.cli.output import emit, force_option, output_option, print_figu
 from quarterdeck.cli.parameters import Real
 
 
-@click.command(short_help="From what has happened so far: losses, additions, withdrawals.")
+@click.command(short_help="From what has happened so far: losses, changes, additions, withdrawals.")
 @click.argument("plan")
 @output_option
 @click.option("--at", "time", type=Real(min=0), required=True, help="Seconds since the mission's start.")
+@click.option("--changes", "changed", metavar="GEOJSON", help="All that is different, a feature a change: docs/replan.md.")
 @click.option("--lost", default="", help="Ids of the vehicles that are lost, with commas; ID@SECONDS: since when.")
 @click.option("--add", metavar="SITE", help="GeoJSON of what is new: obstacles, areas, tasks, vehicles that join.")
 @click.option("--gone", default="", help="Ids of obstacles that are no more, with commas.")
@@ -20,6 +21,7 @@ def command(
     plan: str,
     output: str,
     time: float,
+    changed: str | None,
     lost: str,
     add: str | None,
     gone: str,
@@ -29,29 +31,24 @@ def command(
 ) -> int:
     """Write the mission of PLAN from now on: what is done stays done, survivors go on from where they are and come home."""
     from quarterdeck.geo.errors import InputError
-    from quarterdeck.geo.reader import read_additions
+    from quarterdeck.mission.changes import Changes, read_changes
     from quarterdeck.mission.planfile import plan_text, read_plan
     from quarterdeck.mission.progress import planned_progress
-    from quarterdeck.mission.replan import Changes, replan
+    from quarterdeck.mission.replan import replan
 
     mission = read_plan(plan)
-    stopped: dict[str, float] = {}
+    since: dict[str, float] = {}
     for item in _ids(lost):
-        vehicle, _, since = item.partition("@")
+        vehicle, _, moment = item.partition("@")
         try:
-            stopped[vehicle] = float(since) if since else time
+            since[vehicle] = float(moment) if moment else time
         except ValueError:
-            raise InputError(f"--lost {item}: {since!r} is no number of seconds; write ID or ID@SECONDS") from None
-    added = read_additions(add, mission.frame) if add else None
-    changes = Changes(
-        lost=frozenset(stopped),
-        joined=added.vehicles if added else (),
-        obstacles=added.site.obstacles if added else (),
-        areas=added.site.areas if added else (),
-        tasks=added.tasks if added else (),
-        gone=frozenset(_ids(gone)),
-        withdrawn=frozenset(_ids(withdrawn)),
-    )
+            raise InputError(f"--lost {item}: {moment!r} is no number of seconds; write ID or ID@SECONDS") from None
+    gone_ids, withdrawn_ids = frozenset(_ids(gone)), frozenset(_ids(withdrawn))
+    changes = Changes(lost=frozenset(since), since=since, gone=gone_ids, withdrawn=withdrawn_ids)
+    for source in (add, changed):
+        changes |= read_changes(source, mission) if source else Changes()
+    stopped = {v: changes.since.get(v, time) for v in changes.lost}
     after = replan(mission, planned_progress(mission, time, stopped=stopped), changes, seed=seed)
     emit(plan_text(after), output, force=force)
     print_figures(after)

@@ -19,6 +19,7 @@ from quarterdeck.mission.cover import cover
 from quarterdeck.mission.progress import planned_progress
 from quarterdeck.mission.replan import Changes, replan
 from quarterdeck.mission.routes import survey_tracks
+from quarterdeck.mission.timing import shortfalls
 
 DATA = Path(__file__).parents[2] / "data"
 
@@ -58,7 +59,8 @@ def test_losses_are_taken_over(site, part, count, random):
     assert {v.id for v in after.vehicles} == {v.id for v in before.vehicles} - lost
     covered = swath([*progress.tracks, *lines(after)], before.spacing)
     promised = swath(lines(before), before.spacing)
-    assert promised.difference(covered).area < 0.01 * promised.area
+    assert promised.difference(covered).area < 0.01 * promised.area + after.figures["undone_m2"]
+    assert after.feasible == (after.figures["undone_m2"] < 1e-3 * promised.area)
     for vehicle, route in zip(after.vehicles, after.routes, strict=True):
         assert np.allclose(route.xyz[0], progress.positions[vehicle.id], atol=1e-9)
         assert np.allclose(route.xyz[-1, :2], before.vehicle(vehicle.id).home)
@@ -86,12 +88,15 @@ def test_new_obstacle_is_avoided():
 
 
 def test_all_but_one():
-    """One vehicle of five does what is left of all, and what its battery lacks is told."""
+    """One vehicle of five does what its battery allows and comes home; the rest is told as an area."""
     before = plan("west_ant_island")
     after = replan(before, planned_progress(before, 5000.0), Changes(lost=frozenset({"usv-1", "usv-2", "usv-3", "usv-4"})))
     assert len(after.routes) == 1
     assert not after.feasible
-    assert "short by" in after.reasons[0]
+    assert "can no longer be covered: the energy left does not suffice" in after.reasons[0]
+    assert not shortfalls(after.vehicles[0], after.routes[0])
+    told = next(layer for layer in after.layers if layer.name == "undone")
+    assert shapely.area(told.geometries).sum() == pytest.approx(after.figures["undone_m2"])
 
 
 def test_joining():
