@@ -26,6 +26,7 @@ Autopilot = Literal["ardupilot", "px4"]
 Altitude = Literal["relative", "terrain", "amsl"]
 AUTOPILOTS: tuple[Autopilot, ...] = ("ardupilot", "px4")
 ALTITUDES: tuple[Altitude, ...] = ("relative", "terrain", "amsl")
+STORAGES = (4, 8, 15, 16, 32)  # kB of ArduPilot boards; most have 16
 
 # format: (module, its options, what it is)
 FORMATS: dict[str, tuple[str, dict[str, Any], str]] = {
@@ -51,13 +52,15 @@ FORMATS: dict[str, tuple[str, dict[str, Any], str]] = {
 @dataclass(frozen=True, slots=True)
 class Settings:
     """What an export is for: the `autopilot`; `tell`, called with a line for what the user should know; what heights count
-    from, `altitude`, and the `ground`'s metres above mean sea level, for those that count from there.
+    from, `altitude`, and the `ground`'s metres above mean sea level, for those that count from there. `storage` is
+    that of an ArduPilot board in kB, which limits its mission and fence.
     """
 
     autopilot: Autopilot = "ardupilot"
     tell: Callable[[str], None] = lambda _line: None
     altitude: Altitude = "relative"
     ground: float = 0.0
+    storage: int = 16
 
 
 def export(
@@ -70,6 +73,7 @@ def export(
     ground: float | None = None,
     terrain: Terrain | None = None,
     tolerance: float = 5.0,
+    storage: int = 16,
     split: bool = False,
     force: bool = False,
     tell: Callable[[str], None] | None = None,
@@ -90,6 +94,8 @@ def export(
         raise InputError(f"unknown autopilot {autopilot!r}; known: {', '.join(AUTOPILOTS)}")
     if altitude not in ALTITUDES:
         raise InputError(f"unknown altitude {altitude!r}; known: {', '.join(ALTITUDES)}")
+    if storage not in STORAGES:
+        raise InputError(f"no board has {storage} kB of storage; known: {', '.join(map(str, STORAGES))}")
     if altitude == "terrain" and autopilot == "px4":
         raise InputError("PX4 takes no mission items above terrain; export relative or amsl altitudes")
     told: dict[str, None] = {}
@@ -105,7 +111,7 @@ def export(
         raise InputError(f"the plan must not leave like this: {problems[0]}{more}; plan it again")
     if altitude == "amsl" and not knows_ground(mission) and (ground is None or not math.isfinite(ground)):
         raise InputError("altitudes above mean sea level need the ground's: give --ground METRES, or --terrain FILE")
-    settings = Settings(autopilot, lambda line: told.setdefault(line), altitude, ground or 0.0)
+    settings = Settings(autopilot, lambda line: told.setdefault(line), altitude, ground or 0.0, storage)
     for line in (*mission.figures.get("notes", ()), *too_high(mission)):
         settings.tell(line)
     made: dict[str, bytes | str] = {}

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from quarterdeck.exporters.export import Autopilot, Settings
+from quarterdeck.exporters.limits import board, most_items
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.check import homeward
 from quarterdeck.mission.mission import Mission, Route, Waypoint
@@ -20,9 +21,6 @@ GLOBAL, MISSION_FRAME, RELATIVE, TERRAIN = 0, 2, 3, 10
 FRAMES = {"relative": RELATIVE, "terrain": TERRAIN, "amsl": GLOBAL}
 
 CORNER = 2.0  # m: how far from a waypoint ArduPilot 4.6 turned, flown in its own simulator
-
-# Beyond these counts of items many boards refuse the upload: ArduPilot's 16 kB storage holds 724; PX4 on small boards 500.
-MOST_ITEMS = {"ardupilot": 724, "px4": 500}
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +109,13 @@ def tell_limits(mission: Mission, settings: Settings) -> None:
     """Say, once an export, what autopilots do that a plan cannot hinder: return straight, and cut corners."""
     for line in homeward(mission):
         settings.tell(line)
+    for route in mission.routes:
+        count = len(mission_items(mission, route, settings)) + 1
+        if count > (most := most_items(mission.vehicle(route.vehicle).domain, settings)):
+            settings.tell(
+                f"{route.vehicle}: its mission has {count} items and {board(settings)} holds {most}: "
+                "widen the spacing, or use more vehicles or sorties"
+            )
     for vehicle in mission.vehicles:
         if vehicle.clearance < CORNER:
             settings.tell(

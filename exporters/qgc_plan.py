@@ -35,7 +35,7 @@ def files(mission: Mission, settings: Settings) -> dict[str, str]:
 def _plan(mission: Mission, route: Route, settings: Settings) -> dict[str, Any]:
     vehicle = mission.vehicle(route.vehicle)
     lon, lat = degrees(mission.frame, route.xyz[:1, :2])[0].tolist()
-    inclusion, exclusions = fence_polygons(mission, route.vehicle)
+    inclusion, exclusions = fence_polygons(mission, route.vehicle, settings)
     items = mission_items(mission, route, settings)
     return {
         "fileType": "Plan",

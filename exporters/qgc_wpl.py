@@ -11,7 +11,6 @@ from quarterdeck.exporters.export import Settings
 from quarterdeck.exporters.fence import fence_polygons
 from quarterdeck.exporters.mavlink import (
     GLOBAL,
-    MOST_ITEMS,
     RELATIVE,
     WAYPOINT,
     Item,
@@ -35,13 +34,8 @@ def files(mission: Mission, settings: Settings) -> dict[str, str]:
         lon, lat = mission.frame.to_degrees(route.xyz[:1, :2])[0]
         home = Item(WAYPOINT, GLOBAL, lat=lat, lon=lon, z=home_ground(route, settings))
         items = mission_items(mission, route, settings)
-        if len(items) + 1 > MOST_ITEMS[settings.autopilot]:
-            settings.tell(
-                f"{stem}.waypoints has {len(items) + 1} items; boards with {settings.autopilot} may hold no more than "
-                f"{MOST_ITEMS[settings.autopilot]}: widen the spacing, or use more vehicles"
-            )
         made[f"{stem}.waypoints"] = wpl([home, *items])
-        made[f"{stem}.fence.txt"] = wpl(_fence_items(mission, route.vehicle))
+        made[f"{stem}.fence.txt"] = wpl(_fence_items(mission, route.vehicle, settings))
         made[f"{stem}.rally.txt"] = wpl(
             [Item(RALLY_POINT, RELATIVE, lat=lat, lon=lon, z=mission.vehicle(route.vehicle).altitude)]
         )
@@ -62,8 +56,8 @@ def _decimal(value: float) -> str:
     return f"{value:.6f}"
 
 
-def _fence_items(mission: Mission, vehicle: str) -> list[Item]:
-    inclusion, exclusions = fence_polygons(mission, vehicle)
+def _fence_items(mission: Mission, vehicle: str, settings: Settings) -> list[Item]:
+    inclusion, exclusions = fence_polygons(mission, vehicle, settings)
     items = _ring(mission, inclusion, INCLUSION_VERTEX)
     for polygon in exclusions:
         items += _ring(mission, polygon, EXCLUSION_VERTEX)

@@ -18,6 +18,8 @@ from quarterdeck.cli.parameters import Real
 @click.option("--ground", type=Real(), help="Metres of the ground above mean sea level, for amsl.")
 @terrain_option
 @tolerance_option
+@click.option("--storage", type=click.Choice(["4", "8", "15", "16", "32"]), default="16", show_default=True,
+              help="ArduPilot: the board's storage in kB, which limits mission and fence.")  # fmt: skip
 @click.option("--sorties", is_flag=True, help="Split what is beyond a vehicle's endurance into sorties, a folder each.")
 @force_option
 def command(
@@ -26,6 +28,7 @@ def command(
     out: str,
     terrain: str | None,
     tolerance: float,
+    storage: str,
     sorties: bool,
     force: bool,
     **options: Any,
@@ -43,7 +46,8 @@ def command(
         from quarterdeck.geo.terrain import read_terrain
 
         options["terrain"] = read_terrain(terrain, mission.frame, mission.site.operating.bounds)
-    for path in export(mission, names, Path(out), **options, tolerance=tolerance, split=sorties, force=force, tell=_note):
+    options |= {"tolerance": tolerance, "storage": int(storage), "split": sorties, "force": force}
+    for path in export(mission, names, Path(out), tell=_note, **options):
         click.echo(path)
 
 
