@@ -54,9 +54,9 @@ def _exact(mission: Mission, vehicle: str) -> tuple[Polygon, list[Polygon]]:
 
 def _coarser(inclusion: Polygon, exclusions: list[Polygon], step: float) -> tuple[Polygon, list[Polygon]]:
     """Fewer vertices: borders moved `step` metres to the safe side, then simplified by no more."""
-    inner = inclusion.buffer(-step, join_style="mitre").simplify(step)
+    inner = inclusion.buffer(-step, quad_segs=4).simplify(0.9 * step)
     inner = max(getattr(inner, "geoms", [inner]), key=lambda p: p.area)
-    outer = unary_union([p.buffer(step, join_style="mitre").simplify(step) for p in exclusions])
+    outer = unary_union([p.buffer(step, quad_segs=4).simplify(0.9 * step) for p in exclusions])
     return Polygon(inner.exterior), _solid(outer)
 
 
