@@ -12,6 +12,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon
 
+from quarterdeck.geo.deadline import time_is_up
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.grid import Grid, area_edges, lay_grid, turned
 from quarterdeck.geo.scanline import best_shifts, held
@@ -192,6 +193,8 @@ def _anneal(
                     best, best_state = current, state
         met.append((best, best_state))
         t *= annealing.alpha
+        if time_is_up("the placement of the grid"):
+            break
     return [state for _, state in sorted(met)], tried
 
 
@@ -212,6 +215,8 @@ def _anneal_as_printed(
             if math.exp(min(0.0, (current - new) / t)) > rng.random():
                 best, best_state, state = new, new_state, new_state
         t *= annealing.alpha
+        if time_is_up("the placement of the grid"):
+            break
     return [best_state], tried
 
 
@@ -234,10 +239,13 @@ def _refine(
 
     Returns the best state of all, and how many were tried.
     """
-    results, tried = [], 0
+    results: list[tuple[float, State]] = []
+    tried = 0
     for state in states:
         current, size = index(edges, target, state)[0], 1.0
         for dx, dy, turn in rng.normal(0.0, (0.3, 0.3, 0.06), (TRIES, 3)):
+            if time_is_up("the placement of the grid"):
+                return max([*results, (current, state), (index(edges, target, states[-1])[0], states[-1])])[1], tried
             x, y, angle = _wrapped(state[0] + size * dx, state[1] + size * dy, state[2] + size * turn, fixed)
             near = [(x, y, angle), *((float(v), y, angle) for v in best_shifts(edges, y, angle, 2))]
             tries = [(index(edges, target, s)[0], s) for s in near]

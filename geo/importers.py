@@ -88,7 +88,9 @@ def _unpacked(data: bytes) -> Any:
             if entries[0].file_size > MOST_BYTES:
                 raise InputError(f"unpacks to more than {MOST_BYTES // 1_000_000} MB; give a smaller KMZ")
             return _xml(archive.read(entries[0]))
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError) as error:
+    except InputError:
+        raise
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError, ValueError) as error:
         raise InputError(f"is a damaged KMZ ({error})") from None
 
 

@@ -19,6 +19,7 @@ from quarterdeck.coverage.parts import allot, connected_parts, whole_targets
 from quarterdeck.coverage.placement import Method, place
 from quarterdeck.coverage.shares import even_shares, shares
 from quarterdeck.coverage.tour import tours
+from quarterdeck.geo.deadline import time_is_up
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.grid import Grid
 from quarterdeck.geo.scenario import Scenario, Vehicle, as_multipolygon
@@ -77,6 +78,8 @@ def cover_grid(
     even = even_shares(length, *_figures_alone(vehicles))
     done = _attempt(scenario, grid, roads, shares(vehicles, even), edge, seed)
     for _ in range(ROUNDS if len(vehicles) > 1 and all(v.share is None for v in vehicles) else 0):
+        if time_is_up("the even sharing of the area"):
+            break
         # Ways out and home, and turns, are known now: shares that count them make the slowest sooner done.
         again = _attempt(scenario, grid, roads, even_shares(*_figures_on(vehicles, done.routes)), edge, seed)
         if again.merit >= done.merit:

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
+from quarterdeck.geo.deadline import time_is_up
+
 POWER = 12.0  # of the norm that stands for the maximum while searching
 STEPS = 120_000  # proposals, and as many more for each guard:
 STEPS_A_GUARD = 15_000
@@ -60,7 +62,8 @@ def _improved(
         rows[robot, : len(tour)] = tour
     away = lengths[:m, :m] + np.diag(np.full(m, np.inf))
     near = np.argsort(away, axis=1, kind="stable")[:, : min(12, m - 1)]
-    best, best_sizes = _anneal(lengths, rows, sizes, speeds, spent, near, int(effort * (STEPS + STEPS_A_GUARD * m)), seed)
+    steps = 0 if time_is_up("the search for shorter tours") else int(effort * (STEPS + STEPS_A_GUARD * m))
+    best, best_sizes = _anneal(lengths, rows, sizes, speeds, spent, near, steps, seed)
     return [best[robot, : best_sizes[robot]].tolist() for robot in range(k)]
 
 

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numba
 import numpy as np
 
+from quarterdeck.geo.deadline import cause, time_is_up
 from quarterdeck.mission.director import Command, Director, Event, State
 
 SAME = 1e-9  # s: events this close are one moment
@@ -144,6 +145,9 @@ def run_world(
         )
         if then == inf or then > until:
             reason = "" if then == inf else f"the mission was not over after {until:g} s"
+            break
+        if time_is_up("the mission"):
+            reason, until = f"the run was stopped at {now:,.0f} s of the mission ({cause()})", now
             break
         calls = calls + 1 if then <= now + SAME else 0
         if calls > _MOST_CALLS:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from quarterdeck.geo.deadline import cause, time_is_up
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.director import Director
@@ -76,6 +77,10 @@ def simulate(
         run.record(builder)
         count = 0
         while not run.done and run.time < until - step / 2:
+            if time_is_up("the run"):
+                run.trouble.append(f"the run was stopped at {run.time:,.0f} s of the mission ({cause()})")
+                run.record(builder)
+                break
             run.advance()
             count += 1
             run.time = count * step

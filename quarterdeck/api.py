@@ -3,11 +3,12 @@
 Each stage is imported when it is first called, so that importing the package costs nothing.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+from quarterdeck.geo.deadline import limited
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.reader import read_scenario
 from quarterdeck.geo.scenario import Scenario
@@ -28,6 +29,7 @@ def plan(
     seed: int = 0,
     terrain: Terrain | None = None,
     tolerance: float = 5.0,
+    time_limit: float | None = None,
     **options: Any,
 ) -> Mission:
     """Return a mission that covers the scenario's areas.
@@ -36,24 +38,40 @@ def plan(
     lines (`quarterdeck.mission.lines.plan_lines`), `guards` sees every point from within a limited range
     (`quarterdeck.mission.guards.plan_guards`); `options` are theirs. None: lines where a vehicle has a sensor, else stc.
     Over `terrain` what flies holds its height above ground within `tolerance` metres (`quarterdeck.mission.follow.follow`).
+    After `time_limit` seconds searches end with the best so far, which the mission's header tells.
     Raises InputError if the scenario cannot be planned as it is.
     """
     method = method or default_method(scenario)
     if method not in get_args(Method):
         raise InputError(f"unknown method {method!r}; use one of {', '.join(get_args(Method))}")
+    planner = _planner(method)
+    return _at_height(within(time_limit, lambda: planner(scenario, seed=seed, **options)), terrain, tolerance)
+
+
+def _planner(method: Method) -> Callable[..., Mission]:
     if method == "guards":
         from quarterdeck.mission.guards import plan_guards
 
-        mission = plan_guards(scenario, seed=seed, **options)
-    elif method == "lines":
+        return plan_guards
+    if method == "lines":
         from quarterdeck.mission.lines import plan_lines
 
-        mission = plan_lines(scenario, seed=seed, **options)
-    else:
-        from quarterdeck.mission.cover import cover
+        return plan_lines
+    from quarterdeck.mission.cover import cover
 
-        mission = cover(scenario, seed=seed, **options)
-    return _at_height(mission, terrain, tolerance)
+    return cover
+
+
+def within(time_limit: float | None, make: Callable[[], Mission]) -> Mission:
+    """Return the mission that `make` makes, its searches ended after `time_limit` seconds: its header tells the limit and
+    which searches it cut short.
+    """
+    with limited(time_limit) as limit:
+        mission = make()
+    if time_limit is None:
+        return mission
+    parameters = {**mission.parameters, "time_limit": time_limit}
+    return replace(mission, parameters=parameters, figures={**mission.figures, "cut": limit.cut})
 
 
 def _at_height(mission: Mission, terrain: Terrain | None = None, tolerance: float = 5.0) -> Mission:
@@ -71,11 +89,11 @@ def default_method(scenario: Scenario) -> Method:
     return "lines" if any(v.sensor for v in scenario.vehicles) else "stc"
 
 
-def assign(scenario: Scenario, *, seed: int = 0, **options: Any) -> Mission:
+def assign(scenario: Scenario, *, seed: int = 0, time_limit: float | None = None, **options: Any) -> Mission:
     """Return a mission in which the scenario's vehicles do its tasks (`quarterdeck.mission.assign.assign`)."""
     from quarterdeck.mission.assign import assign as share_out
 
-    return _at_height(share_out(scenario, seed=seed, **options))
+    return _at_height(within(time_limit, lambda: share_out(scenario, seed=seed, time_limit=time_limit, **options)))
 
 
 def simulate(mission: Mission, **options: Any) -> Any:

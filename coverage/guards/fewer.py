@@ -12,6 +12,7 @@ from scipy.sparse import csr_array, vstack
 from quarterdeck.coverage.guards.certificate import TOLERANCE
 from quarterdeck.coverage.guards.cover import small_cover
 from quarterdeck.coverage.guards.space import HAIR, Space
+from quarterdeck.geo.deadline import time_is_up
 from quarterdeck.geo.scenario import as_multipolygon
 from quarterdeck.geo.triangulation import Triangulation
 from quarterdeck.geo.visibility import DISC_SIDES, visibility_polygons, visible_points
@@ -36,6 +37,8 @@ def fewer_guards(space: Space, mesh: Triangulation, guards: np.ndarray, reach: f
     chosen = np.empty(0, dtype=np.int64)
     best, stale = guards, 0
     for turn in range(ROUNDS):
+        if time_is_up("the search for fewer guards"):
+            break
         chosen = small_cover(covers, chosen, STEPS, seed=seed + turn)
         rest = as_multipolygon(space.target.difference(shapely.union_all(views.of(chosen))))
         if rest.area > enough and len(chosen) < len(best):

@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numba import njit
 
+from quarterdeck.geo.deadline import cause, time_is_up
 from quarterdeck.mission.tours.genetic import measure_alone
 from quarterdeck.mission.tours.problem import Problem
 from quarterdeck.mission.tours.rng import below, shuffle, stream, uniform
@@ -44,6 +45,9 @@ def paper_search(
                 progress(done, float(fitness.min()), 0.0)
             if time_limit is not None and clock() - begun >= time_limit:
                 stopped = "time limit"
+                break
+            if time_is_up("the search for shorter tours"):
+                stopped = cause()
                 break
     except KeyboardInterrupt:
         stopped = "interrupted"

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from quarterdeck.geo.deadline import cause, time_is_up
 from quarterdeck.mission.tours.bound import lower_bound
 from quarterdeck.mission.tours.genetic import generation, population
 from quarterdeck.mission.tours.problem import Problem
@@ -77,6 +78,9 @@ def search(
                 break
             if time_limit is not None and clock() - begun >= time_limit:
                 stopped = "time limit"
+                break
+            if time_is_up("the search for shorter tours"):
+                stopped = cause()
                 break
     except KeyboardInterrupt:
         if pop.tally[0] == 0:

@@ -177,8 +177,8 @@ def _distribution(kind: Kind, name: str, value: dict[str, Any]) -> dict[str, tup
 
 def _whole(document: dict[str, Any], name: str, least: int, default: int) -> int:
     value = document.get(name, default)
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise InputError(f"{name!r} must be a whole number from {least}, not {value!r}")
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= 2**53:
+        raise InputError(f"{name!r} must be a whole number from {least} to 2^53, not {str(value)[:40]!r}")
     return value
 
 

@@ -8,7 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from quarterdeck.cli.output import console, emit, force_option, minutes, output_option, print_reason, seed_option
+from quarterdeck.cli.output import (
+    console,
+    emit,
+    force_option,
+    minutes,
+    not_there,
+    output_option,
+    print_cut,
+    print_reason,
+    seed_option,
+    time_limit_option,
+)
 from quarterdeck.cli.parameters import Choice, Numbers, Real
 
 if TYPE_CHECKING:
@@ -54,13 +65,17 @@ class PriorityFunction(click.ParamType):
     "--map", "map_file", metavar="FILE.yaml", help="Drive on this ROS map_server map, not on the site's polygons."
 )
 @click.option("--map-origin", type=Numbers("LON,LAT", 2), help="Where the map's (0, 0) lies; default the site's centre.")
-@click.option("--write-map", metavar="FILE.yaml", help="Write the site's ground map for map_server, .yaml and .pgm.")
+@click.option(
+    "--write-map",
+    metavar="FILE.yaml",
+    callback=not_there,
+    help="Write the site's ground map for map_server, .yaml and .pgm.",
+)
 @click.option("--resolution", type=Real(min=0, min_open=True), help="Side of the map's cells, m.")
 @click.option("--heuristic", type=Choice(["none", "octile", "manhattan"]), default="none", show_default=True,
               help="Dijkstra; A*; or A* with the paper's heuristic, inadmissible: ways may be longer.")  # fmt: skip
 @click.option("--iterations", type=click.IntRange(min=1), default=100, show_default=True, help="Generations of the search.")
-@click.option("--time-limit", type=Real(min=0, min_open=True),
-              help="Seconds after which the search ends; the same seed may then give another plan.")  # fmt: skip
+@time_limit_option
 @seed_option
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on standard error instead of a table.")
 @force_option
@@ -81,8 +96,7 @@ def command(
     """
     from rich.progress import Progress, TextColumn, TimeElapsedColumn
 
-    from quarterdeck.api import plan_text, read_scenario
-    from quarterdeck.mission.assign import assign
+    from quarterdeck.api import assign, plan_text, read_scenario
     from quarterdeck.mission.twin import map_scenario
 
     scenario = read_scenario(site)
@@ -91,8 +105,6 @@ def command(
         scenario, twin = map_scenario(scenario, map_file, map_origin)
     elif map_origin is not None:
         raise click.UsageError("--map-origin needs --map")
-    if write_map is not None:
-        _write_map(scenario, Path(write_map), options["resolution"], force=force)
     shape, parameters = priority_function
     columns = (TextColumn("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=console(), transient=True, disable=not console().is_terminal) as bar:
@@ -104,6 +116,8 @@ def command(
 
         mission = assign(scenario, twin=twin, shape=shape, shape_parameters=parameters, progress=progress, **options)
     text = plan_text(mission)
+    if write_map is not None:
+        _write_map(scenario, Path(write_map), options["resolution"], force=force)
     emit(text, output, force=force)
     if as_json:
         header = json.loads(text.split("\n", 2)[1].rstrip(","))["properties"]
@@ -147,5 +161,6 @@ def _print(mission: Mission) -> None:
             screen.print(f"the last task of priority {level} begins at {start:,.0f} s")
     for name, metres in figures["served_from_metres_off"].items():
         screen.print(f"task {name!r} is served from {metres:.2f} m off: clearance keeps the vehicle away", soft_wrap=True)
+    print_cut(mission)
     for reason in mission.reasons:
         print_reason(screen, "infeasible", reason)

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from quarterdeck.cli.parameters import Real
 from quarterdeck.geo.files import read_bytes, refuse_existing, write_file
 from quarterdeck.mission.mission import Mission
 
@@ -38,6 +39,14 @@ tolerance_option = click.option("--tolerance", type=click.FloatRange(min=0, min_
                                 help="With --terrain: metres above or below that height between waypoints.")  # fmt: skip
 seed_option = click.option(
     "--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Seed of all that is random."
+)
+
+
+time_limit_option = click.option(
+    "--time-limit",
+    metavar="SECONDS",
+    type=Real(min=0, min_open=True),
+    help="End searches and runs after so long, with what there is by then; told. Seeds then promise nothing.",
 )
 
 
@@ -103,8 +112,15 @@ def print_figures(mission: Mission) -> None:
         )
     for note in mission.figures.get("notes", ()):
         print_reason(screen, "note", note)
+    print_cut(mission)
     for reason in mission.reasons:
         print_reason(screen, "infeasible", reason)
+
+
+def print_cut(mission: Mission) -> None:
+    """Print what a time limit has cut short."""
+    if cut := mission.figures.get("cut"):
+        print_reason(console(), "cut short by --time-limit", ", ".join(cut))
 
 
 WORDS = {

@@ -13,6 +13,7 @@ from quarterdeck.cli.output import (
     print_figures,
     seed_option,
     terrain_option,
+    time_limit_option,
     tolerance_option,
 )
 from quarterdeck.cli.parameters import Choice, Numbers, Real
@@ -55,6 +56,7 @@ OPTIONS = {
 @terrain_option
 @tolerance_option
 @seed_option
+@time_limit_option
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on standard error instead of a table.")
 @force_option
 def command(
@@ -64,6 +66,7 @@ def command(
     terrain: str | None,
     tolerance: float,
     seed: int,
+    time_limit: float | None,
     as_json: bool,
     force: bool,
     **options: Any,
@@ -82,7 +85,7 @@ def command(
     if "entry" in given:
         given["entry"] = _entry(given["entry"], scenario.frame)
     ground = _terrain(terrain, scenario) if terrain else None
-    mission = plan(scenario, method=method, seed=seed, terrain=ground, tolerance=tolerance, **given)
+    mission = plan(scenario, method=method, seed=seed, terrain=ground, tolerance=tolerance, time_limit=time_limit, **given)
     text = plan_text(mission)
     emit(text, output, force=force)
     if as_json:

@@ -2,7 +2,7 @@
 
 import click
 
-from quarterdeck.cli.output import emit, force_option, output_option, print_figures
+from quarterdeck.cli.output import emit, force_option, output_option, print_figures, time_limit_option
 from quarterdeck.cli.parameters import Real
 
 
@@ -16,6 +16,7 @@ from quarterdeck.cli.parameters import Real
 @click.option("--gone", default="", help="Ids of obstacles that are no more, with commas.")
 @click.option("--withdrawn", default="", help="Ids of areas and tasks that need not be done any more, with commas.")
 @click.option("--seed", type=click.IntRange(min=0), help="Seed of all that is random; default the plan's.")
+@time_limit_option
 @force_option
 def command(
     plan: str,
@@ -27,9 +28,11 @@ def command(
     gone: str,
     withdrawn: str,
     seed: int | None,
+    time_limit: float | None,
     force: bool,
 ) -> int:
     """Write the mission of PLAN from now on: what is done stays done, survivors go on from where they are and come home."""
+    from quarterdeck.api import within
     from quarterdeck.geo.errors import InputError
     from quarterdeck.mission.changes import Changes, read_changes
     from quarterdeck.mission.planfile import plan_text, read_plan
@@ -49,7 +52,8 @@ def command(
     for source in (add, changed):
         changes |= read_changes(source, mission) if source else Changes()
     stopped = {v: changes.since.get(v, time) for v in changes.lost}
-    after = replan(mission, planned_progress(mission, time, stopped=stopped), changes, seed=seed)
+    so_far = planned_progress(mission, time, stopped=stopped)
+    after = within(time_limit, lambda: replan(mission, so_far, changes, seed=seed))
     emit(plan_text(after), output, force=force)
     print_figures(after)
     return 0 if after.feasible else 1

@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from quarterdeck.cli.output import console, digest, emit, force_option, minutes, not_there, print_reason, seed_option
+from quarterdeck.cli.output import (
+    console,
+    digest,
+    emit,
+    force_option,
+    minutes,
+    not_there,
+    print_reason,
+    seed_option,
+    time_limit_option,
+)
 from quarterdeck.cli.parameters import Choice, Real
 
 if TYPE_CHECKING:
@@ -93,6 +103,7 @@ class Limit(click.ParamType):
 )
 @click.option("--step", type=Real(0.001, 0.1), default=0.1, show_default=True, help="Seconds a step of the world.")
 @click.option("--json", "as_json", is_flag=True, help="Write the report as JSON to standard output.")
+@time_limit_option
 @force_option
 def command(
     report: str | None,
@@ -100,14 +111,18 @@ def command(
     picture: str | None,
     trace: str | None,
     as_json: bool,
+    time_limit: float | None,
     force: bool,
     **options: Any,
 ) -> int:
     """Execute PLAN (a file, or - for standard input) with the vehicles' real dynamics, and tell whether it holds.
 
-    Exit status 1 if the verdict fails.
+    Exit status 1 if the verdict fails. Ctrl-C ends the run and reports on it so far; a second one ends at once.
     """
-    mission, run = execute(**options)
+    from quarterdeck.geo.deadline import limited
+
+    with limited(time_limit, interruptible=True) as limit:
+        mission, run = execute(**options)
     if trace:
         emit(run.trace.to_bytes(mission.frame), trace, force=force)
     if report:
@@ -123,6 +138,8 @@ def command(
     if as_json:
         emit(run.report.to_json(), "-", force=force)
     print_report(mission, run.report)
+    if limit.interrupted:
+        return 130
     return 0 if run.report.passed else 1
 
 

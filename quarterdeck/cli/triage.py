@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from quarterdeck.cli.output import console, emit, force_option, not_there, output_option, print_reason, seed_option
+from quarterdeck.cli.output import (
+    console,
+    emit,
+    force_option,
+    not_there,
+    output_option,
+    print_reason,
+    seed_option,
+    time_limit_option,
+)
 from quarterdeck.cli.parameters import Choice, Real
 
 if TYPE_CHECKING:
@@ -88,6 +97,7 @@ _FROM_ZERO = Real(min=0, max=1e9)
 @click.option("--team", nargs=3, type=click.IntRange(min=0), default=(3, 1, 1), show_default=True,
               help="UGVs, UAVs and medics without SITE.")  # fmt: skip
 @seed_option
+@time_limit_option
 @click.option(
     "--order", type=Choice(["priority", "nearest", "first-come"]), help="How medics choose; default the method's."
 )
@@ -132,12 +142,14 @@ def command(site: str | None, generate: int | None, output: str, force: bool, se
 
 def _run(scenario: Scenario, settings: Settings, seed: int, output: str, force: bool, options: dict[str, Any]) -> int:
     from quarterdeck.exporters.casualties import casualties_csv, casualties_geojson, cursor_on_target, log_csv
+    from quarterdeck.geo.deadline import limited
     from quarterdeck.mission.triage.outcome import run_triage
     from quarterdeck.mission.world import Fault
 
     faults = [Fault(who, when) for who, when in options["fails"]]
     methods = METHODS if options["compare"] else (options["method"],)
-    outcomes = {m: run_triage(scenario, m, settings, seed=seed, faults=faults) for m in methods}
+    with limited(options["time_limit"]):
+        outcomes = {m: run_triage(scenario, m, settings, seed=seed, faults=faults) for m in methods}
     outcome = outcomes[options["method"]]
     files: list[tuple[str | None, Any]] = [
         (options["casualty_csv"], lambda: casualties_csv(outcome)),

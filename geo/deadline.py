@@ -1,0 +1,65 @@
+"""When searches and runs have to end: at a time limit, or when Ctrl-C asks for it. They keep what they have."""
+
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+
+
+@dataclass
+class Limit:
+    """A limit: when it `ends` on the monotonic clock, whether Ctrl-C was pressed, and what was `cut` short by it."""
+
+    ends: float
+    interrupted: bool = False
+    cut: list[str] = field(default_factory=list)
+
+    @property
+    def cause(self) -> str:
+        """Why it cut: `interrupted` or `time limit`."""
+        return "interrupted" if self.interrupted else "time limit"
+
+
+_LIMIT: ContextVar[Limit | None] = ContextVar("limit", default=None)
+
+
+@contextmanager
+def limited(seconds: float | None = None, *, interruptible: bool = False) -> Iterator[Limit]:
+    """Have searches and runs within end after `seconds`; where `interruptible`, at the first Ctrl-C too.
+
+    What cannot be cut, since there would be no result without it, still takes its time; a second Ctrl-C ends it.
+    `interruptible` is for the main thread of a program.
+    """
+    limit = Limit(time.monotonic() + (float("inf") if seconds is None else seconds))
+    token = _LIMIT.set(limit)
+
+    def stop(*_: object) -> None:
+        if limit.interrupted:
+            raise KeyboardInterrupt
+        limit.interrupted = True
+
+    before = signal.signal(signal.SIGINT, stop) if interruptible else None
+    try:
+        yield limit
+    finally:
+        if interruptible:
+            signal.signal(signal.SIGINT, before)
+        _LIMIT.reset(token)
+
+
+def time_is_up(what: str) -> bool:
+    """Tell whether the limit is reached; `what`, in the user's words, is then noted as cut short."""
+    limit = _LIMIT.get()
+    if limit is None or not (limit.interrupted or time.monotonic() >= limit.ends):
+        return False
+    if what not in limit.cut:
+        limit.cut.append(what)
+    return True
+
+
+def cause() -> str:
+    """Return why the time is up: `interrupted` or `time limit`; nothing where there is no limit."""
+    limit = _LIMIT.get()
+    return "" if limit is None else limit.cause
