@@ -1,0 +1,45 @@
+"""Deadlines: what looks at them, what they tell."""
+
+import os
+import signal
+
+import pytest
+
+from quarterdeck.geo.deadline import cause, limited, time_is_up
+
+
+def test_without_a_limit_time_is_never_up():
+    """Nobody is cut who was not limited."""
+    assert not time_is_up("a search")
+    assert cause() == ""
+
+
+def test_a_limit_that_is_reached_is_noted_once_a_search():
+    """Each search that looks after the limit is named, in order; outside, the limit is gone."""
+    with limited(1e-9) as limit:
+        assert time_is_up("one")
+        assert time_is_up("other")
+        assert time_is_up("one")
+        assert cause() == "time limit"
+    assert limit.cut == ["one", "other"]
+    assert not time_is_up("one")
+
+
+def test_a_limit_that_is_not_reached_cuts_nothing():
+    """An hour is not over."""
+    with limited(3600.0) as limit:
+        assert not time_is_up("one")
+    assert limit.cut == []
+
+
+def test_the_first_interrupt_ends_searches_and_the_second_everything():
+    """A real SIGINT is noted, the next one raises; then Python's own handler stands again."""
+    with limited(interruptible=True) as limit:
+        assert not time_is_up("one")
+        os.kill(os.getpid(), signal.SIGINT)
+        assert time_is_up("one")
+        assert limit.interrupted
+        assert cause() == "interrupted"
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

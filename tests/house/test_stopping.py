@@ -1,0 +1,131 @@
+"""Time limits and Ctrl-C at the command line: what there is by then is kept, and told."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from quarterdeck.cli import main
+from quarterdeck.mission.planfile import read_plan
+
+DATA = Path(__file__).parents[2] / "data"
+STOPPED = """
+import os, signal, sys
+from {module} import {holder}
+calls, own = [], {holder}.{name}
+def counted(*args, **options):
+    calls.append(1)
+    if len(calls) == {count}:
+        os.kill(os.getpid(), signal.SIGINT)
+    return own(*args, **options)
+{holder}.{name} = counted
+from quarterdeck.cli import main
+main(sys.argv[1:])
+"""
+
+
+def interrupted(module, holder, name, count, *arguments):
+    """Run the command line in a process that gets a real SIGINT at a function's call of that number; return how it ended."""
+    code = STOPPED.format(module=module, holder=holder, name=name, count=count)
+    command = [sys.executable, "-c", code, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def status(*arguments):
+    """Return the command line's exit status."""
+    with pytest.raises(SystemExit) as stop:
+        main([str(a) for a in arguments])
+    return stop.value.code
+
+
+@pytest.fixture(scope="module")
+def hall(tmp_path_factory):
+    """Return the path of a plan of tasks."""
+    path = tmp_path_factory.mktemp("hall") / "plan.geojson"
+    assert status("assign", DATA / "inspection_hall.geojson", "-o", path, "--iterations", "1") == 0
+    return path
+
+
+def test_a_plan_tells_what_its_time_limit_cut(tmp_path, capsys):
+    """The placement ends at once, the plan is whole, header and screen say what was cut."""
+    path = tmp_path / "plan.geojson"
+    site = DATA / "dalian_harbour.geojson"
+    assert status("plan", site, "--spacing", "80", "--time-limit", "0.001", "-o", path) in (0, 1)
+    mission = read_plan(path)
+    assert mission.parameters["time_limit"] == 0.001
+    assert mission.figures["cut"] == ["the placement of the grid"]
+    assert "cut short by --time-limit: the placement of the grid" in capsys.readouterr().err
+    assert mission.figures["poc"] > 0.5
+
+
+def test_a_plan_without_a_time_limit_says_nothing_of_it(hall):
+    """No limit, no word."""
+    assert "cut" not in read_plan(hall).figures
+
+
+def test_a_simulation_ends_at_its_time_limit(hall, tmp_path):
+    """The report says when and why, and the verdict is that it failed."""
+    report = tmp_path / "report.json"
+    assert status("simulate", hall, "--time-limit", "0.001", "--report", report) == 1
+    assert "the run was stopped at 0 s of the mission (time limit)" in json.loads(report.read_text())["reasons"]
+
+
+def test_triage_ends_at_its_time_limit(tmp_path, capsys):
+    """The outcome is written, with the reason."""
+    out = tmp_path / "out.geojson"
+    assert status("triage", DATA / "triage_drill.geojson", "--time-limit", "0.001", "-o", out) == 1
+    assert out.exists()
+    assert "(time limit)" in capsys.readouterr().err
+
+
+def test_an_interrupted_simulation_reports_so_far(hall, tmp_path):
+    """Ctrl-C after some steps: the report is written whole, says so, and the exit status is 130."""
+    report = tmp_path / "report.json"
+    done = interrupted(
+        "quarterdeck.physics.running", "Running", "advance", 40, "simulate", hall, "--report", report
+    )  # fmt: skip
+    assert done.returncode == 130, done.stderr
+    assert "the run was stopped at 4 s of the mission (interrupted)" in json.loads(report.read_text())["reasons"]
+
+
+def test_an_interrupted_assignment_is_the_best_so_far(tmp_path):
+    """Ctrl-C in the search: the plan is written and says so."""
+    path, site = tmp_path / "plan.geojson", DATA / "inspection_hall.geojson"
+    done = interrupted("quarterdeck.mission.tours", "search", "generation", 2, "assign", site, "-o", path)
+    assert done.returncode == 130, done.stderr
+    assert read_plan(path).figures["stopped"] == "interrupted"
+
+
+def test_an_interrupted_plan_leaves_nothing(tmp_path):
+    """Ctrl-C in a plan: one line, 130, no file."""
+    path, site = tmp_path / "plan.geojson", DATA / "dalian_harbour.geojson"
+    done = interrupted("quarterdeck.coverage", "placement", "index", 5, "plan", site, "--spacing", "80", "-o", path)
+    assert done.returncode == 130
+    assert done.stderr.strip() == "quarterdeck: interrupted"
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupted_campaign_goes_on_where_it_was(hall, tmp_path):
+    """Ctrl-C after the first run: its row is kept, and the campaign called again does the rest alone."""
+    study = tmp_path / "study.toml"
+    study.write_text(f'plan = "{hall}"\nruns = 6\n')
+    journal = tmp_path / "runs" / "runs.jsonl"
+    command = [sys.executable, "-m", "quarterdeck", "campaign", str(study), "-o", str(journal.parent), "--jobs", "1"]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    while process.poll() is None and not (journal.exists() and journal.read_text().count("\n") >= 2):
+        time.sleep(0.01)
+    os.kill(process.pid, signal.SIGINT)
+    assert process.wait() == 130, process.stderr.read()
+    assert process.stderr.read().strip() == "quarterdeck: interrupted"
+    process.stderr.close()
+    kept = journal.read_text().splitlines()[1:]
+    assert 1 <= len(kept) < 6
+    assert status("campaign", study, "-o", journal.parent, "--jobs", "1") == 0
+    rows = journal.read_text().splitlines()[1:]
+    assert rows[: len(kept)] == kept
+    assert sorted(json.loads(row)["number"] for row in rows) == list(range(6))
