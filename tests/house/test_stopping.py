@@ -30,7 +30,7 @@ main(sys.argv[1:])
 
 
 def interrupted(module, holder, name, count, *arguments):
-    """Run the command line in a process that gets a real SIGINT at a function's call of that number; return how it ended."""
+    """Run the command line in a process that gets a real SIGINT at the n-th call of a function; return how it ended."""
     code = STOPPED.format(module=module, holder=holder, name=name, count=count)
     command = [sys.executable, "-c", code, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False)
