@@ -7,6 +7,7 @@ writes nothing. So an export is whole or not at all: every file is made and ever
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from datetime import datetime
 from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
@@ -53,7 +54,7 @@ FORMATS: dict[str, tuple[str, dict[str, Any], str]] = {
 class Settings:
     """What an export is for: the `autopilot`; `tell`, called with a line for what the user should know; what heights count
     from, `altitude`, and the `ground`'s metres above mean sea level, for those that count from there. `storage` is
-    that of an ArduPilot board in kB, which limits its mission and fence.
+    that of an ArduPilot board in kB, which limits its mission and fence; `depart` is when the mission begins, UTC.
     """
 
     autopilot: Autopilot = "ardupilot"
@@ -61,6 +62,7 @@ class Settings:
     altitude: Altitude = "relative"
     ground: float = 0.0
     storage: int = 16
+    depart: datetime | None = None
 
 
 def export(
@@ -74,6 +76,7 @@ def export(
     terrain: Terrain | None = None,
     tolerance: float = 5.0,
     storage: int = 16,
+    depart: datetime | None = None,
     split: bool = False,
     force: bool = False,
     tell: Callable[[str], None] | None = None,
@@ -111,7 +114,7 @@ def export(
         raise InputError(f"the plan must not leave like this: {problems[0]}{more}; plan it again")
     if altitude == "amsl" and not knows_ground(mission) and (ground is None or not math.isfinite(ground)):
         raise InputError("altitudes above mean sea level need the ground's: give --ground METRES, or --terrain FILE")
-    settings = Settings(autopilot, lambda line: told.setdefault(line), altitude, ground or 0.0, storage)
+    settings = Settings(autopilot, lambda line: told.setdefault(line), altitude, ground or 0.0, storage, depart)
     for line in (*mission.figures.get("notes", ()), *too_high(mission)):
         settings.tell(line)
     made: dict[str, bytes | str] = {}

@@ -1,17 +1,21 @@
-"""KML and KMZ for Google Earth and QGIS: one file of the fleet, a folder a vehicle; heights are above ground."""
+"""KML and KMZ for Google Earth and QGIS: one file of the fleet, a folder a vehicle; heights are above ground.
+
+Elements stand in the order that OGC's schema of KML 2.2 wants: styles before shapes, names before all.
+"""
 
 import io
 import zipfile
 from itertools import groupby
 
 import numpy as np
-import shapely
-import simplekml
+from lxml import etree
 
 from quarterdeck.exporters.export import Settings
 from quarterdeck.exporters.places import degrees, file_stems, printable
 from quarterdeck.geo.palette import FILL, SITE, colours
 from quarterdeck.mission.mission import Mission, Route
+
+SPACE = "http://www.opengis.net/kml/2.2"
 
 
 def files(mission: Mission, settings: Settings, *, packed: bool = False) -> dict[str, str | bytes]:  # noqa: ARG001
@@ -22,48 +26,66 @@ def files(mission: Mission, settings: Settings, *, packed: bool = False) -> dict
 
 
 def _document(mission: Mission) -> str:
-    simplekml.Kml.resetidcounter()  # ids count on through a process: the same mission must give the same bytes
-    kml = simplekml.Kml(name=printable(mission.name))
-    site = kml.newfolder(name="site")
-    for name, polygon, role in (
+    root = etree.Element(f"{{{SPACE}}}kml", nsmap={None: SPACE})
+    document = _add(root, "Document")
+    _add(document, "name", printable(mission.name))
+    site = _add(document, "Folder")
+    _add(site, "name", "site")
+    for name, shape, role in (
         *((f"area {a.id}", a.polygon, "area") for a in mission.site.areas),
         ("operating area", mission.site.operating, "operating"),
         *((f"obstacle {o.id}", o.polygon, "obstacle") for o in mission.site.obstacles),
     ):
-        for part in getattr(polygon, "geoms", [polygon]):
-            made = site.newpolygon(
-                name=printable(name),
-                outerboundaryis=_ring(mission, part.exterior),
-                innerboundaryis=[_ring(mission, ring) for ring in part.interiors],
-            )
-            made.style.linestyle.color = _abgr(SITE[role], 255)
-            made.style.polystyle.color = _abgr(SITE[role], round(255 * FILL[role]))
+        for part in getattr(shape, "geoms", [shape]):
+            placemark = _placemark(site, name)
+            style = _add(placemark, "Style")
+            _add(_add(style, "LineStyle"), "color", _abgr(SITE[role], 255))
+            _add(_add(style, "PolyStyle"), "color", _abgr(SITE[role], round(255 * FILL[role])))
+            polygon = _add(placemark, "Polygon")
+            for side, ring in (("outer", part.exterior), *(("inner", r) for r in part.interiors)):
+                linear = _add(_add(polygon, f"{side}BoundaryIs"), "LinearRing")
+                _add(linear, "coordinates", _text(degrees(mission.frame, np.asarray(ring.coords)[:, :2])))
     for route, colour in zip(mission.routes, colours(len(mission.routes)), strict=True):
-        _route(kml.newfolder(name=printable(route.vehicle)), mission, route, colour)
-    return str(kml.kml())
+        folder = _add(document, "Folder")
+        _add(folder, "name", printable(route.vehicle))
+        _route(folder, mission, route, colour)
+    return str(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True), "utf-8")
 
 
-def _route(folder: simplekml.Folder, mission: Mission, route: Route, colour: str) -> None:
-    places = degrees(mission.frame, route.xyz[:, :2])
-    coordinates = np.column_stack([places, np.round(route.xyz[:, 2], 3)]).tolist()
-    flies = mission.vehicle(route.vehicle).domain == "aerial"
-    mode = simplekml.AltitudeMode.relativetoground if flies else simplekml.AltitudeMode.clamptoground
+def _route(folder: etree._Element, mission: Mission, route: Route, colour: str) -> None:
+    places = np.column_stack([degrees(mission.frame, route.xyz[:, :2]), np.round(route.xyz[:, 2], 3)])
+    mode = "relativeToGround" if mission.vehicle(route.vehicle).domain == "aerial" else "clampToGround"
     covers = route.survey
-    runs = groupby(range(1, len(coordinates)), key=lambda i: bool(covers[i]))
+    runs = groupby(range(1, len(places)), key=lambda i: bool(covers[i]))
     for number, (survey, run) in enumerate(runs, 1):
         ends = list(run)
-        kind = "survey" if survey else "transit"
-        line = folder.newlinestring(name=f"{printable(route.vehicle)} {number} {kind}", altitudemode=mode)
-        line.coords = [tuple(coordinates[i]) for i in (ends[0] - 1, *ends)]
-        line.tessellate = 1
-        line.style.linestyle.color = _abgr(colour, 255 if survey else 150)
-        line.style.linestyle.width = 3 if survey else 1.5
-    start = folder.newpoint(name=f"{printable(route.vehicle)} start", coords=[tuple(places[0].tolist())])
-    start.style.iconstyle.color = _abgr(colour, 255)
+        placemark = _placemark(folder, f"{route.vehicle} {number} {'survey' if survey else 'transit'}")
+        style = _add(_add(placemark, "Style"), "LineStyle")
+        _add(style, "color", _abgr(colour, 255 if survey else 150))
+        _add(style, "width", "3" if survey else "1.5")
+        line = _add(placemark, "LineString")
+        _add(line, "tessellate", "1")
+        _add(line, "altitudeMode", mode)
+        _add(line, "coordinates", _text(places[[ends[0] - 1, *ends]]))
+    start = _placemark(folder, f"{route.vehicle} start")
+    _add(_add(_add(start, "Style"), "IconStyle"), "color", _abgr(colour, 255))
+    _add(_add(start, "Point"), "coordinates", _text(places[:1, :2]))
 
 
-def _ring(mission: Mission, ring: shapely.LinearRing) -> list[tuple[float, ...]]:
-    return [tuple(place) for place in degrees(mission.frame, np.asarray(ring.coords)[:, :2]).tolist()]
+def _placemark(folder: etree._Element, name: str) -> etree._Element:
+    made = _add(folder, "Placemark")
+    _add(made, "name", printable(name))
+    return made
+
+
+def _add(parent: etree._Element, tag: str, text: str | None = None) -> etree._Element:
+    made = etree.SubElement(parent, f"{{{SPACE}}}{tag}")
+    made.text = text
+    return made
+
+
+def _text(places: np.ndarray) -> str:
+    return " ".join(",".join(f"{value:.8f}".rstrip("0").rstrip(".") for value in place) for place in places.tolist())
 
 
 def _abgr(colour: str, alpha: int) -> str:

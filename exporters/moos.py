@@ -15,6 +15,8 @@ from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.mission import Mission, Route
 
+POINTS_A_LINE = 50
+
 
 def files(mission: Mission, settings: Settings) -> dict[str, str]:
     """Return `<vehicle>.bhv` for each vehicle that does not fly, and `<mission>.moos` with the origin to be included."""
@@ -51,7 +53,7 @@ def _behaviours(mission: Mission, vehicle: Vehicle, route: Route, origin: str) -
 
     def close() -> None:
         if points:
-            steps.append(_waypoints(len(steps), " : ".join(points), speed, acceptance_radius(vehicle)))
+            steps.append(_waypoints(len(steps), _lines(points), speed, acceptance_radius(vehicle)))
             points.clear()
 
     for i in distinct(route):
@@ -68,6 +70,12 @@ def _behaviours(mission: Mission, vehicle: Vehicle, route: Route, origin: str) -
     flag = f"initialize DEPLOY = false\ninitialize STEP   = 0\n// STEP = {len(steps)}: all is done\n"
     head = "".join(f"// {line}\n" for line in (f"{printable(mission.name)}: {printable(vehicle.id)}", *origin.splitlines()))
     return head + flag + "\n" + "\n".join(steps)
+
+
+def _lines(points: list[str]) -> str:
+    """All points on what the helm takes for one line: it reads 5000 characters at most, and goes on after a backslash."""
+    rows = [points[i : i + POINTS_A_LINE] for i in range(0, len(points), POINTS_A_LINE)]
+    return " : \\\n      ".join(" : ".join(row) for row in rows)
 
 
 def _waypoints(step: int, points: str, speed: float, radius: float) -> str:

@@ -2,7 +2,12 @@
 
 A leg belongs to the waypoint that it ends at, so the first has none. Beyond the schema readers want the file's name to be
 the route's, and no more than 400 kB: longer routes are split, each part beginning where the one before ended.
+
+A schedule has the planned speed of each leg and the stay at each waypoint; its times of arrival and departure are dates in
+the standard, so that they are there only where it is said when the mission begins.
 """
+
+from datetime import datetime, timedelta
 
 from lxml import etree
 
@@ -13,6 +18,7 @@ from quarterdeck.mission.mission import Mission, Route, Waypoint
 
 NAUTICAL_MILE, KNOT = 1852.0, 1852.0 / 3600.0
 MOST_BYTES = 400_000
+DAY = 86_400  # s: no longer stay can be said in version 1.0
 WIDEST = {"1.0": 9.9, "1.1": 5.0, "1.2": 5.0}  # NM: greatest turn radius that the schema allows
 
 
@@ -31,9 +37,7 @@ def files(mission: Mission, settings: Settings, *, version: str) -> dict[str, by
             why = "is no vessel" if vehicle.domain != "surface" else "does not move"
             settings.tell(f"rtz: {route.vehicle} {why} and gets no route")
             continue
-        if any(w.hold > 0 for w in route.waypoints):
-            settings.tell(f"rtz: {route.vehicle}: the times it waits are not carried")
-        whole = _document(mission, vehicle, route, numbers, stem, version)
+        whole = _document(mission, vehicle, route, numbers, stem, version, settings.depart)
         parts = -(-len(whole) // (MOST_BYTES - 10_000))
         if parts == 1:
             made[f"{stem}.rtz"] = whole
@@ -43,11 +47,13 @@ def files(mission: Mission, settings: Settings, *, version: str) -> dict[str, by
         for part in range(parts):
             name = f"{stem}_{part + 1}"
             some = numbers[max(part * size - 1, 0) : (part + 1) * size]
-            made[f"{name}.rtz"] = _document(mission, vehicle, route, some, name, version)
+            made[f"{name}.rtz"] = _document(mission, vehicle, route, some, name, version, settings.depart)
     return made
 
 
-def _document(mission: Mission, vehicle: Vehicle, route: Route, numbers: list[int], name: str, version: str) -> bytes:
+def _document(
+    mission: Mission, vehicle: Vehicle, route: Route, numbers: list[int], name: str, version: str, depart: datetime | None
+) -> bytes:
     namespace = f"http://www.cirm.org/RTZ/{version.replace('.', '/')}"
     root = etree.Element(f"{{{namespace}}}route", nsmap={None: namespace}, version=version)
     etree.SubElement(root, f"{{{namespace}}}routeInfo", routeName=name, vesselName=printable(vehicle.id))
@@ -64,7 +70,33 @@ def _document(mission: Mission, vehicle: Vehicle, route: Route, numbers: list[in
         etree.SubElement(made, f"{{{namespace}}}position", lat=f"{lat:.8f}", lon=f"{lon:.8f}")
         if number != numbers[0]:
             etree.SubElement(made, f"{{{namespace}}}leg", _leg(mission, vehicle, route.waypoints[number]))
+    root.append(_schedule(route, numbers, version, namespace, depart))
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
+
+
+def _schedule(route: Route, numbers: list[int], version: str, namespace: str, depart: datetime | None) -> etree._Element:
+    """The one schedule of a route: 1.0 misspells its elements and gives a stay as the time of a day."""
+    schedules = etree.Element(f"{{{namespace}}}schedules")
+    schedule = etree.SubElement(schedules, f"{{{namespace}}}schedule", id="1", name="planned")
+    manual = etree.SubElement(schedule, f"{{{namespace}}}manual")
+    kind = "sheduleElement" if version == "1.0" else "scheduleElement"
+    for number in numbers:
+        waypoint = route.waypoints[number]
+        made = etree.SubElement(manual, f"{{{namespace}}}{kind}", waypointId=str(number))
+        if depart is not None and number != numbers[-1]:
+            made.set("etd", _utc(depart, waypoint.time + waypoint.hold))
+        if depart is not None and number != numbers[0]:
+            made.set("eta", _utc(depart, waypoint.time))
+        if (stay := round(waypoint.hold)) and (version != "1.0" or stay < DAY):
+            clock = f"{stay // 3600:02d}:{stay // 60 % 60:02d}:{stay % 60:02d}"
+            made.set("stay", clock if version == "1.0" else f"PT{stay}S")
+        if waypoint.speed > 0 and number != numbers[0]:
+            made.set("speed", f"{waypoint.speed / KNOT:.3f}")
+    return schedules
+
+
+def _utc(depart: datetime, seconds: float) -> str:
+    return (depart + timedelta(seconds=round(seconds))).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 def _name(waypoint: Waypoint, number: int) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from quarterdeck.cli.output import force_option, terrain_option, tolerance_option
-from quarterdeck.cli.parameters import Real
+from quarterdeck.cli.parameters import Moment, Real
 
 
 @click.command(short_help="Autopilot and ECDIS files, recording, pictures.")
@@ -20,6 +20,7 @@ from quarterdeck.cli.parameters import Real
 @tolerance_option
 @click.option("--storage", type=click.Choice(["4", "8", "15", "16", "32"]), default="16", show_default=True,
               help="ArduPilot: the board's storage in kB, which limits mission and fence.")  # fmt: skip
+@click.option("--depart", type=Moment(), help="When the mission begins, ISO 8601: RTZ schedules get times.")
 @click.option("--sorties", is_flag=True, help="Split what is beyond a vehicle's endurance into sorties, a folder each.")
 @force_option
 def command(

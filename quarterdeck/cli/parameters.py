@@ -1,6 +1,7 @@
 """Kinds of option values that several commands take."""
 
 import math
+from datetime import UTC, datetime
 from difflib import get_close_matches
 from typing import Any
 
@@ -28,6 +29,25 @@ class Choice(click.Choice[str]):
         near = get_close_matches(str(value), [str(choice) for choice in self.choices], n=1)
         known = super().get_invalid_choice_message(value, ctx)
         return f"{known} Did you mean {near[0]!r}?" if near else known
+
+
+class Moment(click.ParamType):
+    """A date and time, ISO 8601; UTC where it says no zone."""
+
+    name = "ISO8601"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> datetime:
+        """Return the moment in UTC."""
+        if isinstance(value, datetime):
+            return value
+        try:
+            moment = datetime.fromisoformat(value)
+            moment = moment.astimezone(UTC) if moment.tzinfo else moment.replace(tzinfo=UTC)
+        except (ValueError, OverflowError):
+            moment = datetime.min.replace(tzinfo=UTC)
+        if not 1900 <= moment.year <= 9000:
+            self.fail(f"{value!r} is no date and time such as 2026-05-01T06:30Z", param, ctx)
+        return moment
 
 
 class Numbers(click.ParamType):

@@ -7,6 +7,8 @@ import re
 import shutil
 import subprocess
 import zipfile
+from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 import gpxpy
@@ -62,6 +64,36 @@ def test_rtz(make_fleet, version, frame):
         )
 
 
+@pytest.mark.parametrize("version", ["1.0", "1.1", "1.2"])
+def test_rtz_schedule(make_fleet, version):
+    """Speeds and stays always, times only from a departure; each waypoint of the route once, valid by the schema."""
+    mission = make_fleet(1)
+    route = mission.routes[0]
+    held = [replace(w, hold=3725.0 if i == 3 else 0.0) for i, w in enumerate(route.waypoints)]
+    mission = replace(mission, routes=(replace(route, waypoints=tuple(held)),))
+    depart = datetime(2026, 5, 1, 6, 30, tzinfo=UTC)
+    for given in (None, depart):
+        (content,) = rtz.files(mission, Settings(depart=given), version=version).values()
+        root = etree.fromstring(content)
+        schema = FORMATS / "rtz" / f"RTZ Schema version {version.replace('.', '_')}.xsd"
+        if schema.exists():
+            etree.XMLSchema(etree.parse(schema)).assertValid(root)
+        elements = list(root.find(".//{*}schedule/{*}manual"))
+        assert [e.get("waypointId") for e in elements] == [w.get("id") for w in root.iter("{*}waypoint")]
+        knots = [float(e.get("speed")) for e in elements[1:]]
+        assert np.allclose(np.array(knots) * 1852 / 3600, [held[i].speed for i in distinct(route)[1:]], atol=1e-3)
+        stays = {e.get("waypointId"): e.get("stay") for e in elements if e.get("stay")}
+        assert stays == {"3": "01:02:05" if version == "1.0" else "PT3725S"}
+        times = [(e.get("eta"), e.get("etd")) for e in elements]
+        if given is None:
+            assert times == [(None, None)] * len(times)
+            continue
+        assert times[0] == (None, "2026-05-01T06:30:00Z")
+        assert times[-1][1] is None
+        last = datetime.fromisoformat(times[-1][0]) - depart
+        assert abs(last.total_seconds() - held[-1].time) <= 1.0
+
+
 def test_rtz_schema_is_there_to_test_against():
     """The schemas are data beside the repository: say so when they are absent."""
     if not (FORMATS / "rtz").exists():
@@ -102,7 +134,7 @@ def test_gpx(make_fleet, frame):
 @pytest.mark.skipif(shutil.which("gpsbabel") is None, reason="gpsbabel is not installed")
 @pytest.mark.parametrize("kind", ["gpx", "kml"])
 def test_gpsbabel(make_fleet, tmp_path, kind):
-    """gpsbabel, which gpxpy and simplekml have nothing to do with, reads the same places from GPX and KML."""
+    """gpsbabel, which gpxpy has nothing to do with, reads the same places from GPX and KML."""
     mission = make_fleet(1)
     made = (gpx if kind == "gpx" else kml).files(mission, Settings())
     (tmp_path / f"in.{kind}").write_text(made[f"five_boats.{kind}"])
@@ -143,7 +175,7 @@ def test_moos_metres_are_moosgeodesys(make_fleet, frame):
     utm = Transformer.from_crs("EPSG:4326", f"EPSG:{(32600 if lat >= 0 else 32700) + zone}", always_xy=True)
     east, north = utm.transform(lon, lat)
     points = np.array(
-        [p.split(",") for line in re.findall(r"points\s+= (.*)", made["usv1.bhv"]) for p in line.split(" : ")], float
+        [p.split(",") for kind, given in behaviours(made["usv1.bhv"]) for p in dict(given)["points"].split(":")], float
     )
     lonlat = np.column_stack(utm.transform(points[:, 0] + east, points[:, 1] + north, direction="INVERSE"))
     assert difference(lonlat, frame, kept(mission.routes[0])[1:]) <= 1e-7
@@ -210,3 +242,92 @@ def test_plan_is_what_qgroundcontrol_requires(quads):
         assert plan["geoFence"]["version"] == plan["rallyPoints"]["version"] == 2
         assert [p["inclusion"] for p in plan["geoFence"]["polygons"]] == [True, False]
         assert plan["rallyPoints"]["points"][0][2] == 40.0
+
+
+# What the helm's behaviours take: moos-ivp, IvPBehavior.cpp, BHV_Waypoint.cpp and BHV_StationKeep.cpp, setParam.
+EVERY = {"name", "pwt", "priority", "condition", "endflag", "duration", "duration_idle_decay", "perpetual", "updates",
+         "configflag", "activeflag"}  # fmt: skip
+TAKEN = {
+    "BHV_Waypoint": {"points", "polygon", "speed", "capture_line", "capture_radius", "radius", "slip_radius", "nm_radius",
+                     "lead", "lead_damper", "lead_to_start", "order", "repeat", "visual_hints", "wptflag", "cycleflag",
+                     "speed_alt", "use_alt_speed", "wptflag_on_start", "efficiency_measure"},
+    "BHV_StationKeep": {"station_pt", "point", "inner_radius", "outer_radius", "outer_speed", "extra_speed",
+                        "transit_speed", "swing_time", "hibernation_radius", "visual_hints", "center_activate"},
+}  # fmt: skip
+
+
+def behaviours(text):
+    """Return (kind, parameters) of a .bhv as the helm's Populator_BehaviorSet reads it: braces alone on their lines."""
+    found, inside, kind = [], False, ""
+    joined, merged = "", []
+    for raw in text.splitlines():  # FileBuffer.cpp, fileBufferSlash: a buffer of 5000 characters, joined at backslashes
+        assert len(raw) < 5000
+        joined += raw.rstrip("\\ ")
+        if not raw.rstrip().endswith("\\"):
+            merged.append(joined)
+            joined = ""
+    for raw in merged:
+        line = raw.split("//")[0].strip()
+        if not line or line.split()[0] in ("initialize", "set"):
+            continue
+        if line == "{":
+            inside = True
+        elif line == "}":
+            inside = False
+        elif not inside:
+            key, _, kind = (part.strip() for part in line.partition("="))
+            assert key.lower() == "behavior"
+            found.append((kind, []))
+        else:
+            name, equals, value = (part.strip() for part in line.partition("="))
+            assert equals
+            assert value
+            found[-1][1].append((name, value))
+    assert not inside
+    return found
+
+
+def test_moos_behaviours_are_those_of_the_helm(ugv, boats, make_fleet):
+    """Every parameter is one that its behaviour takes, numbers are numbers, and names are given once."""
+    for mission in (ugv, boats, make_fleet(1, lines=5000)):
+        for name, text in moos.files(mission, Settings()).items():
+            if not name.endswith(".bhv"):
+                continue
+            read = behaviours(text)
+            assert read
+            names = [value for _, given in read for key, value in given if key == "name"]
+            assert len(set(names)) == len(read)
+            for kind, given in read:
+                assert {key for key, _ in given} <= EVERY | TAKEN[kind]
+                numbers = [
+                    v for k, v in given if k in ("pwt", "speed", "capture_radius", "slip_radius", "lead", "duration")
+                ]
+                assert all(float(v) > 0 for v in numbers)
+
+
+def test_the_helms_own_sample_passes_the_same_reading():
+    """MOOS-IvP's alpha mission, which its helm runs, is read alike: the test is not kinder to us, nor harder."""
+    sample = FORMATS / "moos" / "alpha.bhv"
+    if not sample.exists():
+        pytest.skip(f"{sample} is absent")
+    for kind, given in behaviours(sample.read_text()):
+        if kind in TAKEN:
+            assert {key for key, _ in given} <= EVERY | TAKEN[kind]
+
+
+@pytest.mark.parametrize("make", ["boats", "quads", "ugv"])
+def test_kml_is_valid_by_its_schema(make, request, tmp_path):
+    """OGC's KML 2.2 schema, which fastkml ships, accepts it; fastkml itself reads every line."""
+    fastkml = pytest.importorskip("fastkml", reason="fastkml is not installed: KML was not validated against its XSD")
+    from fastkml.utils import find_all
+    from fastkml.validator import validate
+
+    mission = request.getfixturevalue(make)
+    (text,) = kml.files(mission, Settings()).values()
+    (tmp_path / "a.kml").write_text(text, encoding="utf-8")
+    assert validate(file_to_validate=tmp_path / "a.kml")
+    read = fastkml.KML.parse(tmp_path / "a.kml")
+    marks = list(find_all(read, of_type=fastkml.Placemark))
+    lines = [m for m in marks if m.geometry.geom_type == "LineString"]
+    moves = sum(len(line.geometry.coords) - 1 for line in lines)
+    assert moves == sum(len(route.waypoints) - 1 for route in mission.routes)
