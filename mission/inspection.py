@@ -11,6 +11,7 @@ from typing import Any
 
 from quarterdeck.mission.director import Command, Director, Event, State, fixed
 from quarterdeck.mission.mission import Mission, Waypoint
+from quarterdeck.mission.triage.plan import METHOD, director_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +100,9 @@ def inspection(mission: Mission) -> Director:
 
 
 def default_director(mission: Mission) -> Director:
-    """Return the director that a mission is meant for: its schedule where tasks were assigned, else its fixed routes."""
+    """Return the director that a mission is meant for: triage, its schedule where tasks were assigned, else its routes."""
+    if mission.method == METHOD:
+        return director_of(mission)
     return inspection(mission) if mission.method == "assign" else fixed(mission)
 
 

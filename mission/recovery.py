@@ -15,6 +15,7 @@ from quarterdeck.mission.inspection import default_director
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.progress import Progress, surveyed
 from quarterdeck.mission.replan import replan
+from quarterdeck.mission.triage.plan import METHOD
 
 ROOM = 3.0  # lengths kept from a vehicle that stands still, as vehicles keep from each other
 
@@ -40,8 +41,11 @@ def recovering(mission: Mission, *, delay: float = 0.0, tell: Callable[[float, M
     """Return the director that replans (`mission.replan.replan`) `delay` seconds after a loss is heard of.
 
     Who is heard of again within the delay was a false alarm; who comes back later takes a part of what is left. `tell` gets
-    the time and each new plan. A loss that nobody is left to recover from changes nothing.
+    the time and each new plan. A loss that nobody is left to recover from changes nothing. A triage team sees to its losses
+    itself.
     """
+    if mission.method == METHOD:
+        return default_director(mission)
 
     def direct(
         time: float, states: Mapping[str, State], events: tuple[Event, ...], memory: Any

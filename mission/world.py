@@ -45,11 +45,15 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """At `time` seconds an actor stops for ever (`stop`), or goes on but is met by nobody any more (`mute`)."""
+    """At `time` seconds an actor stops for ever (`stop`), or goes on with its radio silent (`mute`) `until` it is heard again.
+
+    Who is silent still moves past others: it is for the director to let nothing pass between them.
+    """
 
     actor: str
     time: float
     kind: Literal["stop", "mute"] = "stop"
+    until: float = inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +89,7 @@ def run_world(
 
     `pairs` are the indices of actors who notice each other within `reach` metres: event `met`, once each time they come
     into range. Further events: `seen` (each target once by each actor, its `data` and position with it), `served` (a
-    waypoint's task, after its hold) and `lost`. The director is called at each, and whenever somebody has become idle.
+    waypoint's task, after its hold), `lost` (data `kind`) and, of who was silent, `returned`. The director is called at each, and whenever somebody has become idle.
     """
     ids = [a.id for a in actors]
     index = {name: i for i, name in enumerate(ids)}
@@ -101,8 +105,9 @@ def run_world(
     sight = np.full((n, len(targets)), inf)
     contact = [False] * len(pairs)
     switch = [inf] * len(pairs)
-    alive, mute = [True] * n, [False] * n
-    pending = sorted(faults, key=lambda f: (f.time, f.actor))
+    alive = [True] * n
+    changes = [(f.time, f.actor, f.kind) for f in faults] + [(f.until, f.actor, "heard") for f in faults if f.until < inf]
+    pending = sorted(changes)
     log: list[tuple[float, Event]] = []
 
     def look_ahead(i: int, now: float) -> None:
@@ -112,7 +117,7 @@ def run_world(
         else:
             sight[i] = inf
         for k, j in partners[i]:
-            if not (alive[i] and alive[j]) or mute[i] or mute[j]:
+            if not (alive[i] and alive[j]):
                 switch[k] = inf
             elif contact[k]:
                 switch[k] = _crossing(plans[i].knots, plans[j].knots, reach + EDGE, now, False)
@@ -141,7 +146,7 @@ def run_world(
             min((p.next_stop() for p in plans), default=inf),
             float(sight.min()) if sight.size else inf,
             min(switch, default=inf),
-            pending[0].time if pending else inf,
+            pending[0][0] if pending else inf,
         )
         if then == inf or then > until:
             reason = "" if then == inf else f"the mission was not over after {until:g} s"
@@ -153,18 +158,19 @@ def run_world(
         if calls > _MOST_CALLS:
             raise RuntimeError(f"the director does not let time pass at {now:.3f} s")
         now, events = max(then, now), []
-        while pending and pending[0].time <= now + SAME:
-            fault = pending.pop(0)
-            i = index[fault.actor]
-            mute[i] = True
-            if fault.kind == "stop":
+        while pending and pending[0][0] <= now + SAME:
+            _, name, kind = pending.pop(0)
+            i = index[name]
+            if not alive[i]:
+                continue
+            if kind == "stop":
                 here = _state(plans[i], 0.0, now, True)
                 tracks[i].append(_until(plans[i].knots, now))
                 plans[i] = _Plan(now, here.x, here.y, actors[i].speed, ())
                 plans[i].told = True
                 alive[i] = False
-            look_ahead(i, now)
-            events.append(Event("lost", fault.actor, data={"kind": fault.kind}))
+                look_ahead(i, now)
+            events.append(Event("returned", name) if kind == "heard" else Event("lost", name, data={"kind": kind}))
         for i, plan in enumerate(plans):
             events += [Event("served", ids[i], task) for task in plan.tasks_until(now)]
         for i, k in zip(*np.nonzero(sight <= now + SAME), strict=True):

@@ -72,9 +72,20 @@ class Squad(ABC):
         return self.table["speed"][self.tracks["leg"]]
 
     @property
+    def rest(self) -> np.ndarray:
+        """(k,) metres, on the plan, to the end of the leg that each is on."""
+        end = self.table[self.tracks["leg"]]
+        return np.hypot(*(self.pose()[0][:, :2] - np.column_stack([end["x"], end["y"]])).T)
+
+    @property
     def aside(self) -> np.ndarray:
-        """(k,) metres that each has moved to starboard of its path to keep clear of others."""
+        """(k,) metres that each is told to keep to starboard of its path, to be clear of others."""
         return self.tracks["aside"]
+
+    @property
+    def shifted(self) -> np.ndarray:
+        """(k,) metres of `aside` that each has already moved: it follows what it is told with a lag."""
+        return np.clip(-self.tracks["cross"], 0.0, self.aside)
 
     @abstractmethod
     def figures(self, vehicle: Vehicle) -> np.ndarray:
@@ -234,6 +245,10 @@ class Multirotors(Squad):
     def pose(self) -> tuple[np.ndarray, np.ndarray]:
         w, a, b, c = self.state[:, multirotor.Q : multirotor.Q + 4].T
         return self.state[:, :3].copy(), np.arctan2(2 * (w * c + a * b), 1 - 2 * (b * b + c * c))
+
+    @property
+    def shifted(self) -> np.ndarray:
+        return self.aside  # their `cross` has no side
 
     def velocity(self, current: np.ndarray) -> np.ndarray:
         return self.state[:, 3:6] * self.active[:, None]

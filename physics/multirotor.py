@@ -157,9 +157,10 @@ def _control(s: np.ndarray, p: Any, target: np.ndarray, dt: float, q: np.ndarray
     r00, r01, r02 = 1 - 2 * (b * b + c * c), 2 * (a * b - w * c), 2 * (a * c + w * b)
     r10, r11, r12 = 2 * (a * b + w * c), 1 - 2 * (a * a + c * c), 2 * (b * c - w * a)
     r20, r21, r22 = 2 * (a * c - w * b), 2 * (b * c + w * a), 1 - 2 * (a * a + b * b)
-    ex = 0.5 * ((r02 * yx + r12 * yy + r22 * yz) - (r01 * zx + r11 * zy + r21 * zz))
-    ey = 0.5 * ((r00 * zx + r10 * zy + r20 * zz) - (r02 * xx + r12 * xy + r22 * xz))
-    ez = 0.5 * ((r01 * xx + r11 * xy + r21 * xz) - (r00 * yx + r10 * yy + r20 * yz))
+    # Tilt and heading apart: where the heading is off by half a turn, the tilt that a whole-attitude error asks for is reversed.
+    ex = -(r01 * zx + r11 * zy + r21 * zz)
+    ey = r00 * zx + r10 * zy + r20 * zz
+    ez = np.arctan2(r01 * xx + r11 * xy + r21 * xz, r00 * xx + r10 * xy + r20 * xz)
     kr, kw = p.bandwidth, 2.0 * p.bandwidth
     wx, wy, wz = s[W], s[W + 1], s[W + 2]
     tx = p.jx * kw * (kr * ex - wx) + (p.jz - p.jy) * wy * wz

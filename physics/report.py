@@ -110,6 +110,7 @@ class Report:
     trace_hash: str
     command: Mapping[str, Any] | None = None
     notes: tuple[str, ...] = ()
+    triage: Mapping[str, Any] | None = None  # casualties and figures, the fast world's beside the run's
 
     @property
     def passed(self) -> bool:
@@ -157,12 +158,13 @@ def measure(
     trouble: Sequence[str] = (),
     localisation: Sequence[Mapping[str, Any]] | None = None,
     notes: Sequence[str] = (),
+    triage: Mapping[str, Any] | None = None,
 ) -> Report:
     """Measure a trace against the mission and judge it.
 
     `finished` and `aground` are (k,), `served` the times at which tasks were, `lost` (k,) the vehicles lost by a fault
-    (default: none), `trouble` what made vehicles give up, a line each, `localisation` what `Senses.report` returns,
-    `notes` what is told of a log.
+    (default: none), `trouble` what went wrong, a line each, `localisation` what `Senses.report` returns,
+    `notes` what is told of a log, `triage` what `triage.Compared.document` returns.
     Raises InputError for an unknown limit.
     """
     allowed = check_limits(limits)
@@ -179,8 +181,9 @@ def measure(
     vehicles = tuple(replace(v, lost=g, localisation=p) for v, g, p in zip(vehicles, gone, places, strict=True))
     figures = _figures(mission, trace, vehicles, served)
     reasons = [*trouble, *_reasons(mission, vehicles, figures, allowed)]
+    words = tuple(reasons)
     return Report(
-        mission.name, VERSION, settings, allowed, figures, vehicles, tuple(reasons), trace.hash, notes=tuple(notes)
+        mission.name, VERSION, settings, allowed, figures, vehicles, words, trace.hash, notes=tuple(notes), triage=triage
     )
 
 

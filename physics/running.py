@@ -12,11 +12,13 @@ from quarterdeck.geo.scenario import Site
 from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.director import Command, Director, Event, State
 from quarterdeck.mission.mission import Mission, Waypoint
+from quarterdeck.mission.triage.plan import METHOD as TRIAGE
 from quarterdeck.physics.faults import Fault, active, next_change
 from quarterdeck.physics.fleet import Rovers, Squad, form_squads
 from quarterdeck.physics.rover import climb_parameters
 from quarterdeck.physics.sensing import Legs, Senses, Sensing
-from quarterdeck.physics.separation import give_way
+from quarterdeck.physics.separation import give_way, stop_for_others
+from quarterdeck.physics.sightings import look_out
 from quarterdeck.physics.terrain import stand, steepness
 from quarterdeck.physics.trace import TraceBuilder
 from quarterdeck.physics.wind import MEMORY, step_gusts
@@ -60,6 +62,9 @@ class Running:
         self.start = self.position[:, :2].copy()
         self.harbour = np.array([HARBOUR * v.model.length for v in vehicles])
         self.keep = np.array([KEEP * v.model.length for v in vehicles])
+        if self.mission.method == TRIAGE:  # small robots that meet on purpose
+            self.keep *= 2.0 / KEEP
+        self.brakes = np.array([v.model.acceleration for v in vehicles])
         self.random = np.random.default_rng(self.seed)
         self.gust = np.zeros((self.count, MEMORY))
         self.velocity = np.zeros((self.count, 3))
@@ -89,6 +94,7 @@ class Running:
         self.trouble: list[str] = []  # with the terrain
         if self.terrain is not None:
             self._lay(self.terrain)
+        self.lookout = look_out(self.mission, self.terrain)
         self.world.add_obstacles(blocking, self.terrain)
         up = np.column_stack([np.zeros((self.count, 2)), self.lift])
         self.world.add_vehicles(vehicles, self.position + up, self.heading)
@@ -130,6 +136,9 @@ class Running:
         self.stuck = np.where(self.contact, self.stuck + step, 0.0)
         if self.senses is not None:
             self._sense(self.senses)
+        if self.lookout is not None:
+            self.events += self.lookout.step(self.position[:, :2], ~self.aground & ~self.lost)
+            self._keep_clear()  # among people and at close quarters a second is too long
 
     def decide(self) -> None:
         """Call the director, see to mooring, launching and keeping clear; once a second."""
@@ -138,6 +147,8 @@ class Running:
         reached = self._gather("reached")
         self.events += self._serve(reached)
         mute = dict(zip(self.ids, self.suffering["comms"].tolist(), strict=True))
+        if self.lookout is not None:  # each decides for itself: what passes between them is the director's business
+            mute = dict.fromkeys(self.ids, False)
         # What a mute vehicle has to tell waits; that it is mute is known.
         events = tuple(e for e in self.events if not mute[e.vehicle] or e.kind == "lost")
         self.events = [e for e in self.events if e not in events]
@@ -268,11 +279,12 @@ class Running:
                 self.lost[i] = True
                 squad.command(place, ())
                 squad.scale[place] = 0.0
-                self.events.append(Event("lost", id))
+                self.events.append(Event("lost", id, data={"kind": "stop"}))
             elif self.suffering["thruster"][i] != before["thruster"][i] and not self.lost[i]:
                 squad.scale[place, 0] = 0.5 if self.suffering["thruster"][i] else 1.0
             if self.suffering["comms"][i] != before["comms"][i] and not self.lost[i]:
-                self.events.append(Event("lost" if self.suffering["comms"][i] else "returned", id))
+                kind = {"kind": "mute"}
+                self.events.append(Event("lost", id, data=kind) if self.suffering["comms"][i] else Event("returned", id))
 
     def _sense(self, senses: Senses) -> None:
         """See and localise after a step; tell the guidance and, of robots that get no further, the director."""
@@ -306,7 +318,8 @@ class Running:
         near = np.minimum(np.hypot(*(self.position[:, :2] - self.start).T), np.hypot(*(self.position[:, :2] - self.home).T))
         idle = self._gather("idle")
         self.aground |= self.stuck > STUCK
-        self.moored = idle & (np.hypot(*(self.position[:, :2] - self.home).T) < self.harbour)
+        flying = self.aerial & (self.position[:, 2] > 1.0)
+        self.moored = idle & ~flying & (np.hypot(*(self.position[:, :2] - self.home).T) < self.harbour)
         underway = ~self.moored & ~self.aground & (near > self.harbour)
         for i in np.flatnonzero(underway != self.underway):
             self.world.set_underway(int(i), bool(underway[i]))
@@ -320,11 +333,14 @@ class Running:
         slow, want, aside = np.empty(self.count), np.empty(self.count), self._gather("aside")
         course = self._gather("course")
         speed = np.hypot(self.velocity[:, 0], self.velocity[:, 1])
-        give_way(
-            self.position, course, speed, self._gather("pace"), aside, self.keep, ~self.moored & ~self.aground, slow, want
-        )
+        pace = np.where(self._gather("idle"), 0.0, self._gather("pace"))
+        shifted, present = self._gather("shifted"), ~self.moored & ~self.aground
+        give_way(self.position, course, speed, pace, shifted, self.keep, present, slow, want)
+        if self.lookout is not None:
+            stop_for_others(self.position, course, speed, self.keep / 3, self.brakes, present, slow)
+        rest = self._gather("rest")
         for i in np.flatnonzero(want > aside):
-            ahead = self.position[i, :2] + course[i] * speed[i] * 5.0
+            ahead = self.position[i, :2] + course[i] * min(speed[i] * 5.0, rest[i])
             side = ahead + (want[i] - aside[i]) * np.array([course[i, 1], -course[i, 0]])
             if not self.room[i].contains(LineString([self.position[i, :2], ahead, side])):
                 want[i] = aside[i]

@@ -12,13 +12,17 @@ from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.director import Director
 from quarterdeck.mission.inspection import default_director
 from quarterdeck.mission.mission import Mission
+from quarterdeck.mission.triage.plan import METHOD
 from quarterdeck.physics.faults import read_faults
 from quarterdeck.physics.report import Report, measure
 from quarterdeck.physics.running import DECIDE, Running
 from quarterdeck.physics.sensing import Sensing
 from quarterdeck.physics.terrain import check_terrain
 from quarterdeck.physics.trace import Trace, TraceBuilder
+from quarterdeck.physics.triage import Compared, compare, of_devices
 from quarterdeck.physics.world import open_world
+
+TRIAGE = 7200.0  # s that a triage mission may take at the least, before it is cut short
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +31,7 @@ class Run:
 
     trace: Trace
     report: Report
+    triage: Compared | None = None  # of a triage mission: what became of its casualties
 
 
 def simulate(
@@ -65,6 +70,11 @@ def simulate(
     until = 2.0 * planned + 600.0 if duration is None else duration
     ids = [v.id for v in mission.vehicles]
     befalling, sensing = read_faults(faults, ids, planned, seed), sensing or Sensing()
+    triage = mission.method == METHOD
+    if triage:
+        befalling = of_devices(befalling, mission)
+        # Its routes are those without a find; what casualties add to them shows only in the run.
+        until = max(until, TRIAGE) if duration is None else until
     known, director = mission.site, director or default_director(mission)
     if sensing.unmapped:
         mission = replace(mission, site=replace(known, obstacles=(*known.obstacles, *sensing.unmapped)))
@@ -91,6 +101,11 @@ def simulate(
             if count % every == 0 or run.done:
                 run.record(builder)
     trace = builder.trace()
+    compared = None
+    if triage:
+        late = "" if run.done else f"the mission was not over after {until:,.0f} s"
+        compared = compare(mission, run.memory, trace, befalling, late)
+        mission = compared.expected
     settings: dict[str, Any] = {
         "seed": seed,
         "step": step,
@@ -114,10 +129,11 @@ def simulate(
         limits=limits or {},
         settings=settings,
         lost=run.lost.tolist(),
-        trouble=run.trouble,
+        trouble=[*run.trouble, *(compared.driven.reasons if compared else ())],
         localisation=run.senses.report() if run.senses else None,
+        triage=compared.document() if compared else None,
     )
-    return Run(trace, report)
+    return Run(trace, report, compared)
 
 
 def _check(

@@ -5,9 +5,12 @@ from dataclasses import replace
 from math import hypot
 from typing import Any
 
+from shapely import Point
+from shapely.ops import nearest_points
+
 from quarterdeck.mission.director import Command, State
 from quarterdeck.mission.mission import Waypoint
-from quarterdeck.mission.triage.chase import LEGS, Ways, expanding_square
+from quarterdeck.mission.triage.chase import LEGS, Ways, expanding_square, straight
 from quarterdeck.mission.triage.machines import Row, step
 from quarterdeck.mission.triage.records import XY, Entry, Medic, Memory, Record, Uav, Ugv
 from quarterdeck.mission.triage.settings import Policy, Settings
@@ -19,7 +22,7 @@ _KIND: dict[type, str] = {Ugv: "ugv", Uav: "uav", Medic: "medic"}
 class Desk:
     """One call of the director: `agents` are the records as they stand, `replanned` the medics with a new plan."""
 
-    __slots__ = ("agents", "commands", "log", "out", "policy", "replanned", "settings", "states", "tags", "team", "time")
+    __slots__ = ("agents", "commands", "log", "mute", "out", "policy", "replanned", "settings", "states", "tags", "team", "time")
 
     def __init__(
         self,
@@ -33,13 +36,14 @@ class Desk:
         self.team, self.policy, self.settings, self.time, self.states = team, policy, settings, time, states
         self.agents: dict[str, Any] = dict(memory.agents) if memory else {}
         self.out, self.tags = (memory.out, memory.tags) if memory else (frozenset(), frozenset())
+        self.mute = memory.mute if memory else frozenset()
         self.log: list[Entry] = list(memory.log) if memory else []
         self.commands: dict[str, Command] = {}
         self.replanned: set[str] = set()
 
     def memory(self) -> Memory:
         """Return what is to be kept until the next call."""
-        return Memory(self.agents, self.out, self.tags, tuple(self.log))
+        return Memory(self.agents, self.out, self.mute, self.tags, tuple(self.log))
 
     def change(self, name: str, **changes: Any) -> None:
         """Put a changed record in the place of a member's record."""
@@ -77,13 +81,13 @@ class Desk:
         self.commands[name] = command
         self.change(name, moving=bool(command.waypoints))
 
-    def drive(self, name: str, corners: Iterable[XY], speed: float, hold: float = 0.0) -> None:
-        """Command a member through corners at a speed, and to wait `hold` seconds at the last."""
+    def drive(self, name: str, corners: Iterable[XY], speed: float, hold: float = 0.0, halt: float = 0.0) -> None:
+        """Command a member through corners at a speed, to halt `halt` seconds at each and wait `hold` at the last."""
         points = list(corners) or [self.here(name)]
         z = self.team.uavs[name].z if name in self.team.uavs else 0.0
         last = len(points) - 1
         self.send(
-            name, [Waypoint(x, y, z, speed=speed, hold=hold if i == last else 0.0) for i, (x, y) in enumerate(points)]
+            name, [Waypoint(x, y, z, speed=speed, hold=hold if i == last else halt) for i, (x, y) in enumerate(points)]
         )
 
     def search_field(self, name: str, speed: float) -> None:
@@ -93,17 +97,27 @@ class Desk:
         self.drive(name, expanding_square(here, area, LEGS * self.settings.talk, self.ways(name)), speed)
 
     def lose(self, name: str, kind: str) -> None:
-        """A member stops for ever or, if it is a medic whose device fails, hears and tells nothing any more."""
+        """A member stops for ever or, if only its device fails, hears and tells nothing until it is heard again."""
+        if name in self.out:
+            return
         self.note(name, "lost", kind)
-        if isinstance(self.agents[name], Medic) and kind == "mute":
-            self.change(name, mute=True)
+        if kind == "mute":
+            self.mute |= {name}
         else:
             self.out |= {name}
 
-    def muted(self, name: str) -> bool:
-        """Return whether a member's device has failed."""
-        record = self.agents[name]
-        return isinstance(record, Medic) and record.mute
+    def heard(self, name: str) -> None:
+        """A member's device works again."""
+        if name in self.mute - self.out:
+            self.note(name, "heard again")
+            self.mute -= {name}
+
+    def stand(self, name: str, place: XY) -> XY:
+        """Return the place, or the nearest at which somebody on the ground may be."""
+        if self.ways(name) is straight:
+            return place
+        near = nearest_points(self.team.ground if name in self.team.ugvs else self.team.foot, Point(place))[0]
+        return float(near.x), float(near.y)
 
     def ways(self, name: str) -> Ways:
         """Return the shortest paths of a member."""

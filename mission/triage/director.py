@@ -25,7 +25,8 @@ def triage(team: Team, policy: Policy, settings: Settings) -> Director:
 
     Its events: `seen` by a UGV or medic (subject the casualty; data `x`, `y`, `sort`, for medics
     `category`, for robots `error`, how far off they take it to be), `met`
-    (two in range), `served` (a medic's treatment is over), `lost` (data `kind`: stop, or mute: only the device failed).
+    (two in range), `served` (a medic's treatment is over), `lost` (data `kind`: stop, or mute: only the device failed),
+    `returned` (the device works again).
     """
 
     def direct(
@@ -37,6 +38,9 @@ def triage(team: Team, policy: Policy, settings: Settings) -> Director:
             return desk.commands, desk.memory()
         for event in events:
             _notice(desk, event)
+        for name in desk.agents:
+            if not states[name].alive:
+                desk.lose(name, "stop")
         for name in tuple(desk.agents):
             if desk.agents[name].moving and states[name].idle and name not in desk.commands and name not in desk.out:
                 _ROOM[type(desk.agents[name])].arrived(desk, name)
@@ -68,6 +72,8 @@ def _notice(desk: Desk, event: Event) -> None:
     """Turn what a world reports into what its observer knows."""
     if event.kind == "lost":
         desk.lose(event.vehicle, event.data.get("kind", "stop"))
+    elif event.kind == "returned":
+        desk.heard(event.vehicle)
     elif event.vehicle in desk.out:
         return
     elif event.kind == "seen" and event.subject not in desk.tags:
@@ -86,7 +92,7 @@ def _notice(desk: Desk, event: Event) -> None:
 def _talk(desk: Desk, met: set[tuple[str, str]]) -> None:
     """Let all who are in range, or have been since the last call, exchange what they have to, until nobody has news."""
     reach = float("inf") if desk.policy.everywhere else desk.settings.talk + _EDGE
-    able = [n for n in desk.agents if n not in desk.out and not desk.muted(n)]
+    able = [n for n in desk.agents if n not in desk.out | desk.mute]
     pairs = [p for p in combinations(able, 2) if p in met or desk.distance(*p) <= reach]
     pending = bool(pairs)
     while pending:

@@ -146,7 +146,7 @@ def _plan(desk: Desk, name: str) -> None:
     here = desk.here(name)
     walked = me.walked + ((here[0] - me.last[0]) ** 2 + (here[1] - me.last[1]) ** 2) ** 0.5
     desk.change(name, heading_for=queue[0].id, walked=walked, last=here, looked=0)
-    corners = desk.team.on_foot(here, (queue[0].x, queue[0].y))
+    corners = desk.team.on_foot(here, desk.stand(name, (queue[0].x, queue[0].y)))
     desk.drive(name, corners, _speed(desk, desk.agents[name]))
 
 

@@ -1,7 +1,7 @@
 """One triage mission in the fast world, and what became of every casualty."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -87,20 +87,37 @@ def run_triage(
     other paths than their tours. Raises InputError as `make_team` does, or if a fault names nobody of the team.
     """
     settings = settings or Settings()
-    team = make_team(scenario, method, settings, search)
+    return run_team(scenario, make_team(scenario, method, settings, search), method, settings, seed=seed, faults=faults)
+
+
+def run_team(
+    scenario: Scenario, team: Team, method: str, settings: Settings, *, seed: int = 0, faults: Sequence[Fault] = ()
+) -> Outcome:
+    """Run a team that has been made in the fast world; see `run_triage`. What fails of a medic is his device."""
     names = [*team.ugvs, *team.uavs, *team.medics]
     for fault in faults:
         known = {*names, *(v.id for v in scenario.vehicles)}
         if fault.actor not in known:
             raise InputError(f"--fail {fault.actor}: nobody has this name; use one of {', '.join(sorted(known))}")
-    faults = [Fault(f.actor, f.time, "mute" if f.actor in team.medics else f.kind) for f in faults if f.actor in names]
-    policy = METHODS[method]
+    faults = [replace(f, kind="mute") if f.actor in team.medics else f for f in faults if f.actor in names]
     actors = team.actors(settings)
     robots = len(team.ugvs)
-    pairs = [(i, j) for i, j in combinations(range(len(actors)), 2) if j >= robots]  # UGVs have nothing to tell each other
+    # What UGVs have to tell each other, they tell while they wait together: the moment of their meeting is nothing.
+    pairs = [(i, j) for i, j in combinations(range(len(actors)), 2) if j >= robots]
     seen = targets(scenario, settings, seed)
-    reach = float("inf") if policy.everywhere else settings.talk
-    run = run_world(triage(team, policy, settings), actors, seen, pairs, reach, faults=faults)
+    director = triage(team, METHODS[method], settings)
+    run = run_world(director, actors, seen, pairs, reach_of(method, settings), faults=faults)
+    return judge(scenario, team, method, settings, run, seed=seed)
+
+
+def reach_of(method: str, settings: Settings) -> float:
+    """Return how far two members of a team hear each other, metres."""
+    return float("inf") if METHODS[method].everywhere else settings.talk
+
+
+def judge(scenario: Scenario, team: Team, method: str, settings: Settings, run: Run, *, seed: int) -> Outcome:
+    """Return what became of every casualty in a run, in whichever world: `run.memory` is the director's."""
+    seen = targets(scenario, settings, seed)
     memory: Memory = run.memory
     fates = _fates(scenario, memory.log, {t.id: t.data for t in seen})
     searched = [e.time for e in memory.log if e.what == "state" and e.whom == "section searched"]

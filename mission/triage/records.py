@@ -87,7 +87,6 @@ class Medic:
 
     state: str = "idle"
     moving: bool = False
-    mute: bool = False
     queue: tuple[Report, ...] = ()
     known: frozenset[str] = frozenset()
     treated: tuple[str, ...] = ()
@@ -105,7 +104,7 @@ Record = Ugv | Uav | Medic
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A line of the log. `what`: found, handed, delivered, treatment, treated, undeliverable, lost, state, plan."""
+    """A line of the log. `what`: found, handed, delivered, treatment, treated, undeliverable, lost, heard again, state, plan."""
 
     time: float
     who: str
@@ -118,9 +117,12 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """All that the director keeps: records by id, `tags` on casualties in treatment or treated (seen on the spot), log."""
+    """All that the director keeps: records by id, who is `out` of the mission, whose devices are `mute`, `tags` on casualties
+    in treatment or treated (seen on the spot), log.
+    """
 
     agents: Mapping[str, Record]
     out: frozenset[str] = frozenset()
+    mute: frozenset[str] = frozenset()
     tags: frozenset[str] = frozenset()
     log: tuple[Entry, ...] = ()

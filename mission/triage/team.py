@@ -9,7 +9,8 @@ from shapely import MultiPolygon, Point
 from shapely.ops import nearest_points
 
 from quarterdeck.geo.errors import InputError
-from quarterdeck.geo.scenario import Scenario, as_multipolygon
+from quarterdeck.geo.models import load_model
+from quarterdeck.geo.scenario import Scenario, Vehicle, as_multipolygon
 from quarterdeck.geo.transit import roadmap, shortest_path
 from quarterdeck.mission.mission import Waypoint
 from quarterdeck.mission.triage.chase import Ways, straight
@@ -19,11 +20,19 @@ from quarterdeck.mission.triage.settings import METHODS, SORT, Colour, Settings
 from quarterdeck.mission.world import Actor, Target
 
 _MOVES = 30.0  # s between two places of a moving rendezvous
+_HALT = 1.0  # s
+_STANDOFF = 1.5  # m
+_APART = 4.2  # lengths between UGVs that wait side by side, so that one passes between two others
 
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """A UGV or UAV: `path` is what a UGV searches; `home` when a UAV is where, as (seconds, (x, y)), first to last."""
+    """A UGV or UAV: `path` is what a UGV searches; `home` when a UAV is where, as (seconds, (x, y)), first to last.
+
+    What bodies add: `berth` is how far from the rendezvous a UGV waits, metres east and north; `standoff` how near it drives to
+    a casualty, metres; `halt` how many seconds a UAV that looks for
+    somebody stops where it changes course, which keeps it from flying past him at speed.
+    """
 
     id: str
     start: XY
@@ -32,6 +41,9 @@ class Robot:
     z: float = 0.0
     path: tuple[Waypoint, ...] = ()
     home: tuple[tuple[float, XY], ...] = ()
+    berth: XY = (0.0, 0.0)
+    standoff: float = 0.0
+    halt: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,10 +76,12 @@ class Team:
         ]
 
 
-def make_team(scenario: Scenario, method: str, settings: Settings, search: Search | None = None) -> Team:
+def make_team(
+    scenario: Scenario, method: str, settings: Settings, search: Search | None = None, *, bodies: bool = False
+) -> Team:
     """Return the team of a scenario for a method; `search` gives the UGVs other paths than their tours.
 
-    Raises InputError, in one line, if there is no UGV or medic, no UAV for a method that needs one, or a casualty, medic or
+    With `bodies` nobody is a point: medics keep clear of walls and UGVs wait side by side around the rendezvous. Raises InputError, in one line, if there is no UGV or medic, no UAV for a method that needs one, or a casualty, medic or
     rendezvous is where nobody can get.
     """
     if method not in METHODS:
@@ -85,7 +99,8 @@ def make_team(scenario: Scenario, method: str, settings: Settings, search: Searc
         raise InputError(f'method {method} needs a UAV; add a vehicle with "domain": "aerial", or use --method no-relay')
     clearance = max(u.clearance for u in ugvs)
     ground = scenario.site.navigable("ground", clearance)
-    on_ground, on_foot = ways_in(ground), ways_in(scenario.site.navigable("ground"))
+    foot = scenario.site.navigable("ground", load_model("walker").clearance if bodies else 0.0)
+    on_ground, on_foot = ways_in(ground), ways_in(foot)
     air = scenario.site.navigable("aerial", max((u.clearance for u in uavs), default=0.0))
     _check(scenario)
     spacing = scenario.spacing or settings.spacing
@@ -97,7 +112,11 @@ def make_team(scenario: Scenario, method: str, settings: Settings, search: Searc
     points = _rendezvous(scenario, search) if policy.receiver == "uav" else ()
     routes = [tuple(Waypoint(float(x), float(y), leg="survey", speed=u.speed) for x, y in p)
               for u, p in zip(ugvs, search.paths, strict=True)]  # fmt: skip
-    robots = {u.id: Robot(u.id, u.start, u.speed, s, path=r) for u, s, r in zip(ugvs, sees, routes, strict=True)}
+    berths = _berths(ugvs, search.paths, points) if bodies else [(0.0, 0.0)] * len(ugvs)
+    robots = {
+        u.id: Robot(u.id, u.start, u.speed, s, path=r, berth=b, standoff=_STANDOFF * bodies)
+        for u, s, r, b in zip(ugvs, sees, routes, berths, strict=True)
+    }
     homes: list[tuple[tuple[float, XY], ...]] = [
         ((0.0, points[i % len(points)]),) for i in range(len(uavs) if points else 0)
     ]
@@ -106,11 +125,14 @@ def make_team(scenario: Scenario, method: str, settings: Settings, search: Searc
     used = uavs if policy.receiver == "uav" else []
     return Team(
         ugvs=robots,
-        uavs={u.id: Robot(u.id, u.start, u.speed, 0.0, u.altitude, home=h) for u, h in zip(used, homes, strict=True)},
+        uavs={
+            u.id: Robot(u.id, u.start, u.speed, 0.0, u.altitude, home=h, halt=_HALT * bodies)
+            for u, h in zip(used, homes, strict=True)
+        },
         medics=dict(scenario.medics),
         search=search,
         ground=ground,
-        foot=scenario.site.navigable("ground"),
+        foot=foot,
         air=air,
         on_ground=on_ground,
         on_foot=on_foot,
@@ -208,6 +230,19 @@ def _rendezvous(scenario: Scenario, search: Search) -> tuple[XY, ...]:
     free = scenario.site.navigable("ground")
     near = centre if free.covers(centre) else free.boundary.interpolate(free.boundary.project(centre))
     return ((near.x, near.y),)
+
+
+def _berths(ugvs: Sequence[Vehicle], paths: Sequence[np.ndarray], rendezvous: Sequence[XY]) -> list[XY]:
+    """Return where each UGV waits, from the rendezvous: on a circle, `_APART` lengths from the next, on its section's side."""
+    if len(ugvs) < 2 or not rendezvous:
+        return [(0.0, 0.0)] * len(ugvs)
+    radius = _APART * max(u.model.length for u in ugvs) / (2 * np.sin(np.pi / len(ugvs)))
+    away = np.array([p.mean(axis=0) for p in paths]) - rendezvous[0]
+    wanted = np.arctan2(away[:, 1], away[:, 0])
+    even = np.empty(len(ugvs))
+    even[np.argsort(wanted, kind="stable")] = 2 * np.pi * np.arange(len(ugvs)) / len(ugvs)
+    angles = even + np.angle(np.exp(1j * (wanted - even)).mean())
+    return [(float(radius * np.cos(a)), float(radius * np.sin(a))) for a in angles]
 
 
 def _moving(ugvs: Mapping[str, Robot], free: MultiPolygon) -> tuple[tuple[float, XY], ...]:

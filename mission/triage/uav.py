@@ -145,7 +145,7 @@ def _fly_to_medic(desk: Desk, name: str) -> None:
     target = min(meant, key=lambda m: (meeting_time(courses[m], here, robot.speed, desk.time), m))
     desk.change(name, target=target, sweeps=0)
     corners = chase(courses[target], here, robot.speed, desk.time, desk.team.in_air)
-    desk.drive(name, corners, robot.speed, hold=desk.settings.linger)
+    desk.drive(name, corners, robot.speed, hold=desk.settings.linger, halt=robot.halt)
 
 
 def _give_up(desk: Desk, name: str) -> None:

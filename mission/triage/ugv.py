@@ -2,16 +2,15 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
-
-from shapely import Point
-from shapely.ops import nearest_points
+from math import hypot
 
 from quarterdeck.mission.triage import medic, uav
-from quarterdeck.mission.triage.chase import chase, meeting_time, predict, straight
+from quarterdeck.mission.triage.chase import chase, meeting_time, predict
 from quarterdeck.mission.triage.desk import Desk
 from quarterdeck.mission.triage.records import XY, Report, Uav, Ugv
 
 _REPORTING = ("deliver", "wait", "seek")
+_OUTSIDE = 3.0  # times as far from the rendezvous as its place there
 
 
 def saw(desk: Desk, name: str, report: Report) -> None:
@@ -198,17 +197,28 @@ def _to_rendezvous(desk: Desk, name: str) -> list[XY]:
             arrival = desk.time + _length(path) / speed
             if since <= arrival:
                 place = later
-        path = [here, *ways(here, place)]
+        path, at = [here], here
+        for corner in _berth(desk, name, place):
+            path += ways(at, corner)
+            at = corner
         options.append((_length(path), path[1:]))
     return list(min(options)[1])
 
 
+def _berth(desk: Desk, name: str, rendezvous: XY) -> list[XY]:
+    """Return the way into its own place at a rendezvous: straight from outside, so that nobody who waits is in the way."""
+    dx, dy = desk.team.ugvs[name].berth
+    if not dx and not dy:
+        return [rendezvous]
+    x, y = rendezvous
+    return [desk.stand(name, (x + far * dx, y + far * dy)) for far in (_OUTSIDE, 1.0)]
+
+
 def _wait(desk: Desk, name: str) -> None:
-    """Wait where the UAV will come, following the rendezvous where it moves on; not at all without a UAV."""
+    """Wait where the UAV will come: at the rendezvous, or in a round robin where it stands; not at all without a UAV."""
     direct = desk.policy.receiver == "medic" or desk.agents[name].relay_lost
-    corners = [desk.here(name)]
-    if desk.settings.rendezvous == "moving" and not direct:
-        corners = _to_rendezvous(desk, name)
+    visited = direct or desk.settings.rendezvous == "round-robin"
+    corners = [desk.here(name)] if visited else _to_rendezvous(desk, name)
     desk.drive(name, corners, desk.team.ugvs[name].speed, hold=0.0 if direct else desk.settings.patience)
 
 
@@ -245,11 +255,12 @@ def _back(desk: Desk, name: str) -> None:
 
 
 def _drive_to(desk: Desk, name: str, place: XY) -> None:
-    """Drive to a casualty, or as near as clearance lets it."""
-    if desk.team.on_ground is not straight:
-        near = nearest_points(desk.team.ground, Point(place))[0]
-        place = (float(near.x), float(near.y))
-    _drive(desk, name, desk.team.on_ground(desk.here(name), place))
+    """Drive to a casualty, or as near as it may."""
+    (x, y), (hx, hy), off = place, desk.here(name), desk.team.ugvs[name].standoff
+    if off > 0:
+        part = min(off / max(hypot(hx - x, hy - y), 1e-9), 1.0)
+        place = (x + part * (hx - x), y + part * (hy - y))
+    _drive(desk, name, desk.team.on_ground(desk.here(name), desk.stand(name, place)))
 
 
 def _drive(desk: Desk, name: str, corners: Sequence[XY]) -> None:

@@ -71,16 +71,16 @@ def test_holds_earliest_departures_and_tasks() -> None:
     assert run.length("a") == 15.0
 
 
-def test_a_stopped_actor_stands_and_a_mute_one_is_not_met() -> None:
-    """`stop` freezes an actor where it is; `mute` lets it go on, unmet."""
+def test_a_stopped_actor_stands_and_a_mute_one_goes_on() -> None:
+    """`stop` freezes an actor where it is, unmet; `mute` lets it go on, and tells of its beginning and its end."""
     routes = {"a": [Waypoint(10, 0, speed=1.0)], "b": [Waypoint(0, 1, speed=1.0)]}
     actors = [Actor("a", 0, 0), Actor("b", 10, 1)]
     stopped = run_world(sent(routes), actors, [], [(0, 1)], 2.0, faults=[Fault("a", 2.0)])
     assert stopped.tracks["a"][-1].tolist() == [2.0, 2.0, 0.0]
-    mute = run_world(sent(routes), actors, [], [(0, 1)], 2.0, faults=[Fault("a", 2.0, "mute")])
+    assert [e.kind for _, e in stopped.events] == ["lost"]
+    mute = run_world(sent(routes), actors, [], [(0, 1)], 2.0, faults=[Fault("a", 2.0, "mute", 3.0)])
     assert mute.tracks["a"][-1, 1] == 10.0
-    for run in (stopped, mute):
-        assert [e.kind for _, e in run.events] == ["lost"]
+    assert [(t, e.kind) for t, e in mute.events if e.kind != "met"] == [(2.0, "lost"), (3.0, "returned")]
 
 
 def test_a_run_is_cut_at_its_time_limit_with_a_reason() -> None:
