@@ -1,6 +1,8 @@
 """Pictures of a triage mission: the timeline that a commander reads, and the field with everybody's way."""
 
 import io
+from collections.abc import Sequence
+from itertools import pairwise
 
 import matplotlib as mpl
 import numpy as np
@@ -8,9 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
-from shapely import get_parts, get_rings
+from shapely import LineString, get_parts, get_rings, union_all
+from shapely.geometry.base import BaseGeometry
 
 from quarterdeck.exporters.casualties import MEANING
+from quarterdeck.exporters.map_furniture import fill
 from quarterdeck.geo.palette import CASUALTY
 from quarterdeck.mission.triage.figures import counts_over_time
 from quarterdeck.mission.triage.outcome import Outcome, track_at
@@ -45,6 +49,66 @@ def map_png(outcome: Outcome, *, dpi: int = 150) -> bytes:
     return png(figure, dpi=dpi)
 
 
+def snapshots_png(outcome: Outcome, moments: Sequence[tuple[float, str]] | None = None, *, dpi: int = 110) -> bytes:
+    """Return a PNG of the field at `moments` (seconds, words), in the manner of the paper's Fig. 6.
+
+    Default: what a reader of the log would point at. Shaded is what the UGVs have searched until then.
+    """
+    chosen = list(moments or telling_moments(outcome))
+    columns = 2 if len(chosen) <= 4 else 3
+    rows = -(-len(chosen) // columns)
+    figure = Figure(figsize=(6.0 * columns, 4.1 * rows), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for ax, (time, words) in zip(axes, chosen, strict=False):
+        draw_field(ax, outcome, until=time, searched=True)
+        ax.set_title(f"t = {time:.0f} s: {words}", fontsize=9, loc="left", parse_math=False)
+    for ax in axes[len(chosen) :]:
+        ax.set_axis_off()
+    figure.legend(handles=field_legend(outcome), fontsize=8, loc="outside lower center", ncols=10)
+    return png(figure, dpi=dpi)
+
+
+def telling_moments(outcome: Outcome) -> list[tuple[float, str]]:
+    """Return six to nine moments to draw: the first of each kind of thing that happens, losses, the end, and between."""
+    words = {
+        ("handed", ""): "{who} has told {whom} of its first finds",
+        ("delivered", ""): "{who} tells {whom}",
+        ("state", "centre reached, urgent ones left"): "{who} looks around a red and has found another",
+        ("state", "nobody there"): "{who} waits at the rendezvous",
+        ("state", "patience over"): "{who} has waited in vain and looks for the medic",
+        ("state", "section overdue"): "{who} takes over the section of {about}",
+        ("treatment", ""): "{who} treats the first",
+        ("undeliverable", ""): "{who} gives up telling a medic",
+    }
+    found: list[tuple[float, str]] = []
+    seen = set()
+    for entry in outcome.log:
+        key = (entry.what, entry.whom if entry.what == "state" else "")
+        if entry.what == "lost":
+            found.append((entry.time, f"{entry.who} {'is lost' if entry.about == 'stop' else 'is not heard any more'}"))
+        elif key in words and key not in seen:
+            seen.add(key)
+            later = 1.0 if entry.what == "handed" else 0.0  # then the UAV is on its way
+            found.append((entry.time + later, words[key].format(who=entry.who, whom=entry.whom, about=entry.about)))
+    searched = [e.time for e in outcome.log if e.whom == "section searched"]
+    if searched:
+        found.append((max(searched), "all that could be searched is searched"))
+    found.append((outcome.end, "the end"))
+    apart: list[tuple[float, str]] = []
+    for moment in sorted(found):
+        if not apart or moment[0] - apart[-1][0] > 0.01 * outcome.end or moment[1] == "the end":
+            apart.append(moment)
+    while 1 < len(apart) < 6:
+        before, after = max(pairwise([(0.0, ""), *apart]), key=lambda pair: pair[1][0] - pair[0][0])
+        time = (before[0] + after[0]) / 2
+        counts = [
+            sum(t is not None and t <= time for t in times)
+            for times in ([f.found for f in outcome.fates], [f.treated for f in outcome.fates])
+        ]
+        apart = sorted([*apart, (time, f"{counts[0]} found, {counts[1]} treated")])
+    return [*apart[:8], apart[-1]] if len(apart) > 9 else apart
+
+
 def png(figure: Figure, *, dpi: int = 150) -> bytes:
     """Return a figure's PNG bytes, the same for the same figure."""
     stream = io.BytesIO()
@@ -54,15 +118,23 @@ def png(figure: Figure, *, dpi: int = 150) -> bytes:
 
 
 def draw_field(
-    ax: Axes, outcome: Outcome, *, until: float | None = None, ways: tuple[str, ...] = ("ugv", "uav", "medic")
+    ax: Axes,
+    outcome: Outcome,
+    *,
+    until: float | None = None,
+    ways: tuple[str, ...] = ("ugv", "uav", "medic"),
+    searched: bool = False,
 ) -> None:
     """Draw the field, obstacles, casualties and ways up to `until` seconds (None: to the end) on an axes, in metres.
 
-    `ways` says whose ways are drawn. A casualty not found yet is hollow, a treated one is crossed out.
+    `ways` says whose ways are drawn; `searched` shades what UGVs have passed within their range. A casualty not found yet
+    is hollow, one found and not told to a medic has no rim, a treated one is crossed out.
     """
     until = max(float(t[-1, 0]) for t in outcome.run.tracks.values()) if until is None else until
     site = outcome.scenario.site
     shapes = [(site.area, "none", "#555555"), *((o.polygon, "#c9b8a8", "#6b5a4a") for o in site.obstacles)]
+    if searched:
+        fill(ax, _searched(outcome, until), facecolor="#dfe8f2", edgecolor="none", zorder=0)
     for polygons, face, edge in shapes:
         for ring in get_rings(get_parts(polygons)):
             ax.fill(*np.array(ring.coords).T, lw=0.8, fc=face, ec=edge)
@@ -79,15 +151,15 @@ def draw_field(
         ax.plot(*here, marker=marker, color=colour, ms=7, mec="black", mew=0.6, zorder=5)
     for fate in outcome.fates:
         colour = CASUALTY[fate.colour]
-        seen = fate.found is not None and fate.found <= until
+        seen, told = (t is not None and t <= until for t in (fate.found, fate.delivered))
         ax.plot(
             fate.x,
             fate.y,
             "*",
             ms=12,
             mfc=colour if seen else "white",
-            mec=colour if not seen else "black",
-            mew=0.8,
+            mec="black" if told else colour,
+            mew=0.9,
             zorder=4,
         )
         if fate.treated is not None and fate.treated <= until:
@@ -95,6 +167,16 @@ def draw_field(
     ax.set_aspect("equal")
     ax.margins(0.03)
     ax.tick_params(labelsize=7)
+
+
+def _searched(outcome: Outcome, until: float) -> BaseGeometry:
+    """Return what UGVs have passed within their range until then."""
+    swaths = []
+    for name, robot in outcome.team.ugvs.items():
+        track = outcome.run.tracks[name]
+        path = np.vstack([track[track[:, 0] <= until, 1:], track_at(track, np.array([until]))])
+        swaths.append(LineString(np.vstack([path, path[-1:]])).simplify(0.1).buffer(robot.sees))
+    return union_all(swaths, grid_size=1e-3).intersection(outcome.scenario.site.area)
 
 
 def field_legend(outcome: Outcome) -> list[Line2D]:
@@ -106,7 +188,11 @@ def field_legend(outcome: Outcome) -> list[Line2D]:
     handles = [mark(u, "s", color=_UGVS[i % len(_UGVS)]) for i, u in enumerate(outcome.team.ugvs)]
     handles += [mark("UAV", "^", color=_UAV)] if outcome.team.uavs else []
     handles += [mark("medic", "P", color=_MEDIC), mark("not found yet", "*", ms=10, mfc="white", mec="black")]
-    handles += [mark("found", "*", ms=10, color="black"), mark("treated", "x", color="black")]
+    handles += [
+        mark("found", "*", ms=10, color="#d62728", mew=0),
+        mark("a medic knows", "*", ms=10, mfc="#d62728", mec="black"),
+    ]
+    handles += [mark("treated", "x", color="black")]
     return handles
 
 

@@ -45,7 +45,7 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """At `time` seconds an actor stops for ever (`stop`), or goes on with its radio silent (`mute`) `until` it is heard again.
+    """At `time` seconds an actor stops for ever (`stop`), or goes on, its radio silent (`mute`) `until` it is heard again.
 
     Who is silent still moves past others: it is for the director to let nothing pass between them.
     """
@@ -89,7 +89,8 @@ def run_world(
 
     `pairs` are the indices of actors who notice each other within `reach` metres: event `met`, once each time they come
     into range. Further events: `seen` (each target once by each actor, its `data` and position with it), `served` (a
-    waypoint's task, after its hold), `lost` (data `kind`) and, of who was silent, `returned`. The director is called at each, and whenever somebody has become idle.
+    waypoint's task, after its hold), `lost` (data `kind`) and, of who was silent, `returned`. The director is called at
+    each, and whenever somebody has become idle.
     """
     ids = [a.id for a in actors]
     index = {name: i for i, name in enumerate(ids)}

@@ -157,7 +157,7 @@ def _control(s: np.ndarray, p: Any, target: np.ndarray, dt: float, q: np.ndarray
     r00, r01, r02 = 1 - 2 * (b * b + c * c), 2 * (a * b - w * c), 2 * (a * c + w * b)
     r10, r11, r12 = 2 * (a * b + w * c), 1 - 2 * (a * a + c * c), 2 * (b * c - w * a)
     r20, r21, r22 = 2 * (a * c - w * b), 2 * (b * c + w * a), 1 - 2 * (a * a + b * b)
-    # Tilt and heading apart: where the heading is off by half a turn, the tilt that a whole-attitude error asks for is reversed.
+    # Tilt and heading apart: with the heading off by half a turn, a whole-attitude error asks for the reversed tilt.
     ex = -(r01 * zx + r11 * zy + r21 * zz)
     ey = r00 * zx + r10 * zy + r20 * zz
     ez = np.arctan2(r01 * xx + r11 * xy + r21 * xz, r00 * xx + r10 * xy + r20 * xz)

@@ -27,9 +27,9 @@ def give_way(
     """Set `slow` (k,), the speed allowed, m/s, and `want` (k,), how far to starboard of its path each is to go, metres.
 
     `position` (k, 3); `course` (k, 2) the direction of the leg, zeros for one that lies still; `speed` (k,) over ground and
-    `pace` (k,) as planned, m/s, 0 for one that is done; `aside` (k,) how far off its leg each has already gone; `keep` (k,) the distance kept;
-    `present` (k,) those out there. Conflicts are looked for between the legs as planned, so that a vehicle stays aside
-    until the other is past.
+    `pace` (k,) as planned, m/s, 0 for one that is done; `aside` (k,) how far off its leg each has already gone; `keep` (k,)
+    the distance kept; `present` (k,) those out there. Conflicts are looked for between the legs as planned, so that a
+    vehicle stays aside until the other is past.
     """
     for i in range(len(position)):
         slow[i], want[i] = np.inf, 0.0
@@ -71,7 +71,8 @@ def give_way(
             bearing = _wrap(np.arctan2(py, px) - angle)
             if abs(bearing) > 1.96 and np.hypot(px, py) > 0.5 * apart:  # abaft the beam: the other's business
                 continue
-            if (vx == 0.0 and vy == 0.0 or turning) and speed[j] < 0.3:  # lies still: pass it by, and slowly before there is room to
+            still = ((vx == 0.0 and vy == 0.0) or turning) and speed[j] < 0.3
+            if still:  # pass it by, slowly until there is room
                 want[i] = 1.3 * apart
                 if beside < 0.8 * apart and course[j, 0] == 0.0 and course[j, 1] == 0.0:
                     slow[i] = min(slow[i], max(0.5 * (gap - 0.8 * apart), 0.2))
@@ -98,7 +99,7 @@ def stop_for_others(
     present: np.ndarray,
     slow: np.ndarray,
 ) -> None:
-    """Set `slow` (k,) to 0 for whoever would come too near, before it could stop, to one that moves and is before it in the list.
+    """Set `slow` (k,) to 0 for whoever would come too near, before it could stop, to a moving one before it in the list.
 
     Where small vehicles meet on purpose this comes on top of `give_way`: `radius` (k,) metres of the hulls, `brakes` (k,)
     m/s2; all else as there. Who stands goes on standing until the other is past.

@@ -23,6 +23,7 @@ from quarterdeck.physics.triage import Compared, compare, of_devices
 from quarterdeck.physics.world import open_world
 
 TRIAGE = 7200.0  # s that a triage mission may take at the least, before it is cut short
+LATE = 2.5  # times as long as the fast world, which turns in no time, a triage mission may take
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +76,7 @@ def simulate(
         befalling = of_devices(befalling, mission)
         # Its routes are those without a find; what casualties add to them shows only in the run.
         until = max(until, TRIAGE) if duration is None else until
+        limits = {"delay": LATE} | dict(limits or {})
     known, director = mission.site, director or default_director(mission)
     if sensing.unmapped:
         mission = replace(mission, site=replace(known, obstacles=(*known.obstacles, *sensing.unmapped)))

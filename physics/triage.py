@@ -20,7 +20,7 @@ TIMES = ("found", "reported", "delivered", "reached", "treated")
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """A mission as it was `driven` and as the fast world has it with the same faults; `expected` has its tracks as routes."""
+    """A mission as it was `driven` and as the `fast` world has it; `expected` has the fast tracks as routes."""
 
     driven: Outcome
     fast: Outcome
@@ -45,7 +45,8 @@ def of_devices(faults: Sequence[Fault], mission: Mission) -> tuple[Fault, ...]:
 def compare(mission: Mission, memory: Any, trace: Trace, faults: Sequence[Fault], reason: str) -> Compared:
     """Return what became of the casualties in a run that left `trace` and the director's `memory`, beside the fast world.
 
-    `reason` says why the run was cut short, if it was. The fast world knows vehicles lost and radios silent, no other faults.
+    `reason` says why the run was cut short, if it was. The fast world knows vehicles lost and radios silent, no other
+    faults.
     """
     tracks = {v: np.column_stack([trace.time, trace.x[:, i], trace.y[:, i]]) for i, v in enumerate(trace.vehicles)}
     run = world.Run(tracks, (), float(trace.time[-1]), memory, reason)
@@ -59,7 +60,7 @@ def compare(mission: Mission, memory: Any, trace: Trace, faults: Sequence[Fault]
 
 def _as_route(vehicle: Vehicle, track: np.ndarray) -> Route:
     """Return an (n, 3) track of seconds, x, y as a route; standing is holding."""
-    waypoints = [Waypoint(*map(float, track[0, 1:]), leg="start")]
+    waypoints = [Waypoint(float(track[0, 1]), float(track[0, 2]), leg="start")]
     energy = 0.0
     for (t0, x0, y0), (t1, x, y) in zip(track[:-1].tolist(), track[1:].tolist(), strict=True):
         seconds, metres = t1 - t0, float(np.hypot(x - x0, y - y0))

@@ -22,7 +22,20 @@ _KIND: dict[type, str] = {Ugv: "ugv", Uav: "uav", Medic: "medic"}
 class Desk:
     """One call of the director: `agents` are the records as they stand, `replanned` the medics with a new plan."""
 
-    __slots__ = ("agents", "commands", "log", "mute", "out", "policy", "replanned", "settings", "states", "tags", "team", "time")
+    __slots__ = (
+        "agents",
+        "commands",
+        "log",
+        "mute",
+        "out",
+        "policy",
+        "replanned",
+        "settings",
+        "states",
+        "tags",
+        "team",
+        "time",
+    )
 
     def __init__(
         self,

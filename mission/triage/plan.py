@@ -1,14 +1,16 @@
 """The triage mission as a PLAN: what everybody does before anything is found, and all that its director starts from."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, fields
+from dataclasses import fields
+
+import numpy as np
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.models import load_model
 from quarterdeck.geo.scenario import Scenario, Vehicle
 from quarterdeck.geo.version import VERSION
 from quarterdeck.mission.director import Director
-from quarterdeck.mission.mission import Leg, Mission, Route, Waypoint
+from quarterdeck.mission.mission import Mission, Route, Waypoint
 from quarterdeck.mission.timing import shortfalls, timed_route
 from quarterdeck.mission.triage.director import triage
 from quarterdeck.mission.triage.outcome import Outcome, run_team
@@ -21,12 +23,18 @@ METHOD = "triage"  # of a mission; which of the paper's four is among its parame
 
 
 def plan_triage(
-    scenario: Scenario, method: str = "relay", settings: Settings | None = None, *, seed: int = 0, search: Search | None = None
+    scenario: Scenario,
+    method: str = "relay",
+    settings: Settings | None = None,
+    *,
+    seed: int = 0,
+    search: Search | None = None,
 ) -> Mission:
     """Return the mission of a method on a scenario, medics walking as vehicles do.
 
     Its routes are the UGVs' search paths, the UAVs' way to the rendezvous, and the medics' starts; its director changes
-    them as casualties are found. `search` gives the UGVs other paths than their tours. Raises InputError as `make_team` does.
+    them as casualties are found. `search` gives the UGVs other paths than their tours. Raises InputError as `make_team`
+    does.
     """
     settings = settings or Settings()
     team = make_team(scenario, method, settings, search, bodies=True)
@@ -73,7 +81,7 @@ def settings_of(mission: Mission) -> Settings:
 def scenario_of(mission: Mission) -> Scenario:
     """Return the scenario of a triage mission, its rendezvous where the UAVs' routes end."""
     medics = set(mission.parameters["medics"])
-    aerial = {v.id for v in mission.vehicles if v.domain == "aerial"}
+    ends = {r.vehicle: (r.waypoints[-1].x, r.waypoints[-1].y) for r in mission.routes}
     return Scenario(
         name=mission.name,
         frame=mission.frame,
@@ -81,7 +89,7 @@ def scenario_of(mission: Mission) -> Scenario:
         vehicles=tuple(v for v in mission.vehicles if v.id not in medics),
         casualties=mission.casualties,
         medics=tuple((v.id, v.start) for v in mission.vehicles if v.id in medics),
-        rendezvous=tuple((r.vehicle, (r.waypoints[-1].x, r.waypoints[-1].y)) for r in mission.routes if r.vehicle in aerial),
+        rendezvous=tuple((v.id, ends[v.id]) for v in mission.vehicles if v.domain == "aerial"),
         input_hash=mission.input_hash,
     )
 
@@ -111,12 +119,12 @@ def _sight(settings: Settings) -> float:
 
 def _route(vehicle: Vehicle, team: Team) -> Route:
     x, y = vehicle.start
-    points, legs = [(x, y, 0.0)], ["start"]  # type: list[tuple[float, float, float]], list[Leg]
     if vehicle.id in team.ugvs:
         path = [(w.x, w.y, 0.0) for w in team.ugvs[vehicle.id].path]
-        points, legs = points + path, [*legs, *["survey"] * len(path)]
-    elif vehicle.id in team.uavs:
+        return timed_route(vehicle, np.array([(x, y, 0.0), *path]), ["start", *["survey"] * len(path)])  # type: ignore[list-item]
+    if vehicle.id in team.uavs:
         robot = team.uavs[vehicle.id]
-        corners = [(*c, robot.z) for c in team.in_air(vehicle.start, robot.home[0][1])]
-        points, legs = [*points, (x, y, robot.z), *corners], [*legs, "takeoff", *["transit"] * len(corners)]
-    return timed_route(vehicle, points, legs) if len(points) > 1 else Route(vehicle.id, (Waypoint(x, y, leg="start"),))
+        way = [(*corner, robot.z) for corner in team.in_air(vehicle.start, robot.home[0][1])]
+        points = np.array([(x, y, 0.0), (x, y, robot.z), *way])
+        return timed_route(vehicle, points, ["start", "takeoff", *["transit"] * len(way)])  # type: ignore[list-item]
+    return Route(vehicle.id, (Waypoint(x, y, leg="start"),))

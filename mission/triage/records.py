@@ -104,7 +104,7 @@ Record = Ugv | Uav | Medic
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A line of the log. `what`: found, handed, delivered, treatment, treated, undeliverable, lost, heard again, state, plan."""
+    """A line of the log. `what`: found, handed, delivered, treatment, treated, undeliverable, lost, heard again, state."""
 
     time: float
     who: str
@@ -117,8 +117,8 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """All that the director keeps: records by id, who is `out` of the mission, whose devices are `mute`, `tags` on casualties
-    in treatment or treated (seen on the spot), log.
+    """All that the director keeps: records by id, who is `out` of the mission, whose devices are `mute`, `tags` on
+    casualties in treatment or treated (seen on the spot), log.
     """
 
     agents: Mapping[str, Record]

@@ -29,9 +29,9 @@ _APART = 4.2  # lengths between UGVs that wait side by side, so that one passes 
 class Robot:
     """A UGV or UAV: `path` is what a UGV searches; `home` when a UAV is where, as (seconds, (x, y)), first to last.
 
-    What bodies add: `berth` is how far from the rendezvous a UGV waits, metres east and north; `standoff` how near it drives to
-    a casualty, metres; `halt` how many seconds a UAV that looks for
-    somebody stops where it changes course, which keeps it from flying past him at speed.
+    What bodies add: `berth` is how far from the rendezvous a UGV waits, metres east and north; `standoff` how near it
+    drives to a casualty, metres; `halt` how many seconds a UAV that looks for somebody stops where it changes course, so
+    that it does not fly past him at speed.
     """
 
     id: str
@@ -81,7 +81,8 @@ def make_team(
 ) -> Team:
     """Return the team of a scenario for a method; `search` gives the UGVs other paths than their tours.
 
-    With `bodies` nobody is a point: medics keep clear of walls and UGVs wait side by side around the rendezvous. Raises InputError, in one line, if there is no UGV or medic, no UAV for a method that needs one, or a casualty, medic or
+    With `bodies` nobody is a point: medics keep clear of walls, UGVs wait side by side around the rendezvous. Raises
+    InputError, in one line, if there is no UGV or medic, no UAV for a method that needs one, or a casualty, medic or
     rendezvous is where nobody can get.
     """
     if method not in METHODS:
@@ -233,7 +234,7 @@ def _rendezvous(scenario: Scenario, search: Search) -> tuple[XY, ...]:
 
 
 def _berths(ugvs: Sequence[Vehicle], paths: Sequence[np.ndarray], rendezvous: Sequence[XY]) -> list[XY]:
-    """Return where each UGV waits, from the rendezvous: on a circle, `_APART` lengths from the next, on its section's side."""
+    """Return where each UGV waits, from the rendezvous: on a circle, `_APART` lengths from the next, near its section."""
     if len(ugvs) < 2 or not rendezvous:
         return [(0.0, 0.0)] * len(ugvs)
     radius = _APART * max(u.model.length for u in ugvs) / (2 * np.sin(np.pi / len(ugvs)))

@@ -20,9 +20,12 @@ from quarterdeck.cli.output import (
     time_limit_option,
 )
 from quarterdeck.cli.parameters import Choice, Real
+from quarterdeck.geo.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
+
+    from rich.console import Console
 
     from quarterdeck.mission.mission import Mission
     from quarterdeck.physics.report import Report
@@ -69,6 +72,12 @@ class Limit(click.ParamType):
 @click.option("--report", metavar="FILE", callback=not_there, help="Write the report as JSON.")
 @click.option("--rrd", metavar="FILE", callback=not_there, help="Record the run for rerun.")
 @click.option("--picture", metavar="FILE", callback=not_there, help="Draw plan, tracks and misses as a PNG.")
+@click.option(
+    "--snapshots", metavar="FILE", callback=not_there, help="Draw the field of a triage plan at telling moments as PNG."
+)
+@click.option(
+    "--casualties", metavar="FILE", callback=not_there, help="Write what became of a triage plan's casualties, GeoJSON."
+)
 @click.option("--trace", metavar="FILE", callback=not_there, help="Write every sample of the run (NPZ).")
 @click.option("--current", type=Vector(), default="0,0", show_default=True, help="Water's motion, m/s east and north.")
 @click.option("--wind", type=Vector(), default="0,0", show_default=True, help="Mean wind, m/s towards east and north.")
@@ -109,6 +118,8 @@ def command(
     report: str | None,
     rrd: str | None,
     picture: str | None,
+    snapshots: str | None,
+    casualties: str | None,
     trace: str | None,
     as_json: bool,
     time_limit: float | None,
@@ -135,6 +146,16 @@ def command(
         from quarterdeck.exporters.picture import picture as draw
 
         emit(draw(mission, run.trace, run.report), picture, force=force)
+    if snapshots or casualties:
+        if run.triage is None:
+            raise InputError("--snapshots and --casualties are for plans of triage; use --picture and --report")
+        from quarterdeck.exporters.casualties import casualties_geojson
+        from quarterdeck.exporters.triage_picture import snapshots_png
+
+        if snapshots:
+            emit(snapshots_png(run.triage.driven), snapshots, force=force)
+        if casualties:
+            emit(casualties_geojson(run.triage.driven), casualties, force=force)
     if as_json:
         emit(run.report.to_json(), "-", force=force)
     print_report(mission, run.report)
@@ -258,10 +279,27 @@ def print_report(mission: Mission, report: Report, *, how: str = "simulated") ->
     screen.print("; ".join(words))
     for note in report.notes:
         print_reason(screen, "note", note)
+    if report.triage is not None:
+        _print_triage(screen, report.triage)
     for reason in report.reasons:
         print_reason(screen, "failed", reason)
     if report.passed:
         screen.print("passed", style="bold")
+
+
+def _print_triage(screen: Console, triage: Mapping[str, Any]) -> None:
+    """Print what became of the casualties, the fast world's beside the run's."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    from quarterdeck.cli.triage import ROWS
+
+    table = Table(title=f"triage, {triage['method']}", title_justify="left", box=SIMPLE_HEAD)
+    for column in ("", "fast world", "this run"):
+        table.add_column(column, justify="right" if column else "left")
+    for name, (label, form) in ROWS.items():
+        table.add_row(label, *("-" if value is None else form.format(value) for value in triage["figures"][name]))
+    screen.print(table)
 
 
 def _metres(distance: float | None) -> str:

@@ -83,6 +83,8 @@ _FROM_ZERO = Real(min=0, max=1e9)
 @click.option("--start", metavar="TIME", help="When the mission began, such as 2026-05-01T09:00:00Z, for --cot.")
 @click.option("--timeline", metavar="FILE", callback=not_there, help="Draw the timeline as PNG.")
 @click.option("--map", "field_map", metavar="FILE", callback=not_there, help="Draw the field with everybody's way as PNG.")
+@click.option("--snapshots", metavar="FILE", callback=not_there, help="Draw the field at telling moments as PNG (Fig. 6).")
+@click.option("--plan", metavar="FILE", callback=not_there, help="Write the PLAN that `simulate` executes in PyBullet.")
 @click.option("--fail", "fails", type=AtTime(), multiple=True, help="A robot, or a medic's device, fails; repeatable.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on standard error instead of a table.")
 @click.option(
@@ -143,7 +145,9 @@ def command(site: str | None, generate: int | None, output: str, force: bool, se
 def _run(scenario: Scenario, settings: Settings, seed: int, output: str, force: bool, options: dict[str, Any]) -> int:
     from quarterdeck.exporters.casualties import casualties_csv, casualties_geojson, cursor_on_target, log_csv
     from quarterdeck.geo.deadline import limited
+    from quarterdeck.mission.planfile import plan_text
     from quarterdeck.mission.triage.outcome import run_triage
+    from quarterdeck.mission.triage.plan import plan_triage
     from quarterdeck.mission.world import Fault
 
     faults = [Fault(who, when) for who, when in options["fails"]]
@@ -157,6 +161,8 @@ def _run(scenario: Scenario, settings: Settings, seed: int, output: str, force: 
         (options["cot"], lambda: cursor_on_target(outcome, options["start"])),
         (options["timeline"], lambda: _timeline(outcome)),
         (options["field_map"], lambda: _map(outcome)),
+        (options["snapshots"], lambda: _snapshots(outcome)),
+        (options["plan"], lambda: plan_text(plan_triage(scenario, options["method"], settings, seed=seed))),
     ]
     made = [(path, make()) for path, make in files if path]
     emit(casualties_geojson(outcome), output, force=force)
@@ -221,6 +227,12 @@ def _map(outcome: Outcome) -> bytes:
     from quarterdeck.exporters.triage_picture import map_png
 
     return map_png(outcome)
+
+
+def _snapshots(outcome: Outcome) -> bytes:
+    from quarterdeck.exporters.triage_picture import snapshots_png
+
+    return snapshots_png(outcome)
 
 
 def _plain(outcome: Outcome) -> dict[str, Any]:

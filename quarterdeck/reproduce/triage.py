@@ -168,19 +168,11 @@ def draw() -> dict[str, bytes]:
     """Return the PNGs of Figs 6 to 9 by file name."""
     from matplotlib.figure import Figure
 
-    from quarterdeck.exporters.triage_picture import draw_field, field_legend, png
+    from quarterdeck.exporters.triage_picture import draw_field, field_legend, png, snapshots_png
     from quarterdeck.mission.triage.scripted import laboratory_case, simulation_case
 
     case = simulation_case()
     relay, laboratory = case.run(), laboratory_case().run()
-
-    def snapshots(outcome: Outcome, moments: list[tuple[float, str]]) -> bytes:
-        figure = Figure(figsize=(12, 8.2), layout="constrained")
-        for ax, (time, words) in zip(figure.subplots(2, 2).flat, moments, strict=True):
-            draw_field(ax, outcome, until=time)
-            ax.set_title(f"t = {time:.0f} s: {words}", fontsize=9, loc="left")
-        figure.legend(handles=field_legend(outcome), fontsize=8, loc="outside lower center", ncols=9)
-        return png(figure, dpi=110)
 
     def ways(panels: list[tuple[Outcome, str]], drawn: tuple[str, ...]) -> bytes:
         figure = Figure(figsize=(6.2 * len(panels), 4.6), layout="constrained")
@@ -192,10 +184,10 @@ def draw() -> dict[str, bytes]:
 
     others = [(case.run(m), m.replace("-", " ")) for m in ("no-priority", "no-relay", "constant")]
     return {
-        "fig6.png": snapshots(relay, _moments_of_fig_6(relay)),
+        "fig6.png": snapshots_png(relay, _moments_of_fig_6(relay)),
         "fig7.png": ways([(relay, "relay")], ("ugv", "uav", "medic")),
         "fig8.png": ways(others, ("medic",)),
-        "fig9.png": snapshots(laboratory, _moments_of_fig_9(laboratory)),
+        "fig9.png": snapshots_png(laboratory, _moments_of_fig_9(laboratory)),
     }
 
 

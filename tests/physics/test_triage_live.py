@@ -1,34 +1,110 @@
-"""The triage director in PyBullet: the same state machines, on vehicles that accelerate, turn and slip."""
+"""Triage in PyBullet: the same state machines, on vehicles that accelerate, turn and slip, and whose sight ends at walls."""
 
-from typing import Any
+import json
+from dataclasses import replace
 
+import jsonschema
+import numpy as np
 import pytest
+from shapely import box
 
+from quarterdeck.geo.scenario import Casualty, Obstacle, Scenario, Site
+from quarterdeck.geo.terrain import Terrain
+from quarterdeck.mission.check import check_mission
+from quarterdeck.mission.mission import Mission
+from quarterdeck.mission.planfile import plan_text, read_plan
 from quarterdeck.mission.triage.generate import generate, paper_team
-from quarterdeck.mission.triage.live import live_triage
-from quarterdeck.mission.triage.settings import Settings
+from quarterdeck.mission.triage.plan import plan_triage, run_plan
+from quarterdeck.physics.report import report_schema
+from quarterdeck.physics.sightings import Lookout
 
 pytest.importorskip("pybullet", reason="PyBullet is not installed")
 
 
-def test_all_casualties_are_found_told_and_treated_in_pybullet() -> None:
-    """Two UGVs, a UAV and a medic on 30 x 20 m finish: each casualty found, delivered and treated once, in that order."""
+def yard(seed: int = 1, casualties: int = 4) -> Scenario:
+    """Two UGVs, a UAV and a medic on 30 x 20 m."""
+    return generate(paper_team(ugvs=2, size=(30.0, 20.0)), seed, casualties=(casualties, casualties))
+
+
+def planned(scenario: Scenario, tmp_path) -> Mission:  # type: ignore[no-untyped-def]
+    """Return the mission as a PLAN file brings it back."""
+    path = tmp_path / "plan.geojson"
+    path.write_text(plan_text(plan_triage(scenario)), encoding="utf-8")
+    return read_plan(path)
+
+
+def test_a_triage_plan_is_driven_as_the_fast_world_expects(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    """Each casualty is found, delivered and treated once, in that order, in both worlds, told side by side."""
     from quarterdeck.physics.simulate import simulate
 
-    scenario = generate(paper_team(ugvs=2, size=(30.0, 20.0)), 1, casualties=(4, 4))
-    mission, director = live_triage(scenario, "relay", Settings(talk=4.0))
-    last: list[Any] = []
+    mission = planned(yard(), tmp_path)
+    assert check_mission(mission) == ()
+    run = simulate(mission)
+    assert run.report.passed, run.report.reasons
+    assert run.triage is not None
+    for fate in run.triage.driven.fates:
+        assert fate.found <= fate.delivered <= fate.reached < fate.treated  # type: ignore[operator]
+    treated = [e.about for e in run.triage.driven.log if e.what == "treated"]
+    assert sorted(treated) == sorted(c.id for c in mission.casualties)
+    fast, driven = run.report.triage["figures"]["time"]  # type: ignore[index]
+    assert fast == run_plan(mission).end
+    assert fast < driven < 2.0 * fast
+    jsonschema.Draft202012Validator(report_schema()).validate(json.loads(run.report.to_json()))
 
-    def watched(*call: Any) -> Any:
-        commands, memory = director(*call)
-        last[:] = [memory]
-        return commands, memory
 
-    simulate(mission, director=watched, duration=600.0)
-    memory = last[0].inner
-    when = {(e.what, e.about): e.time for e in reversed(memory.log)}
-    for casualty in scenario.casualties:
-        assert when["found", casualty.id] <= when["treatment", casualty.id] < when["treated", casualty.id]
-    assert [e.about for e in memory.log if e.what == "treated"].count("c1") == 1
-    assert memory.agents["ugv1"].state == memory.agents["ugv2"].state == "done"
-    assert memory.agents["medic1"].state == "idle"
+@pytest.mark.parametrize("fault", ["ugv1@15", "uav1@20", "medic1@25"])
+def test_who_fails_in_pybullet_takes_no_reported_casualty_along(fault: str, tmp_path) -> None:  # type: ignore[no-untyped-def]
+    """A UGV, the UAV or the medic's device fails: what was reported is treated, or told with its reason."""
+    from quarterdeck.physics.simulate import simulate
+
+    run = simulate(planned(yard(3, 6), tmp_path), faults=[fault])
+    assert run.triage is not None
+    for fate in run.triage.driven.fates:
+        if fate.reported is not None:
+            assert fate.treated is not None or fate.undeliverable
+        if fate.state != "treated":
+            assert any(f"casualty {fate.id} " in reason for reason in run.report.reasons)
+
+
+def test_rough_ground_is_climbed_and_seen_over(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    """On hills of 1.5 m all are found and treated; UGVs and medic stand on the ground, and it takes them more energy."""
+    from quarterdeck.physics.simulate import simulate
+
+    mission = planned(yard(), tmp_path)
+    (west, south, *_) = mission.site.operating.bounds
+    x, y = np.meshgrid(np.arange(0.0, 32.0), np.arange(0.0, 22.0))
+    hills = Terrain((west - 1, south - 1), 1.0, 1.5 * np.sin(x / 4.0) * np.cos(y / 3.0))
+    flat, rough = simulate(mission), simulate(mission, terrain=hills)
+    assert rough.triage is not None
+    assert all(f.treated is not None for f in rough.triage.driven.fates)
+    rolling = [i for i, v in enumerate(mission.vehicles) if v.domain == "ground"]
+    assert np.ptp(rough.trace.ground[:, rolling]) > 1.0
+    assert sum(v.energy for v in rough.report.vehicles if v.domain == "ground") > sum(
+        v.energy for v in flat.report.vehicles if v.domain == "ground"
+    )
+
+
+def test_nobody_is_seen_behind_a_wall_or_a_hill() -> None:
+    """A casualty 2 m away is seen in the open, not through a wall, over a low one, and not behind a crest."""
+    base = paper_team(ugvs=1, size=(30.0, 20.0))
+    scenario = replace(base, casualties=(Casualty("c", (17.0, 1.0), "red"),))
+    wall = Obstacle("wall", box(15.9, 0.0, 16.1, 3.0), height=2.0)
+
+    def seen(scenario: Scenario, terrain: Terrain | None = None) -> bool:
+        mission = plan_triage(scenario)
+        look = Lookout(mission, terrain)
+        position = np.array([v.start for v in mission.vehicles])
+        position[look.ids.index("ugv1")] = 15.0, 1.0
+        events = look.step(position, np.ones(len(position), bool))
+        return ("seen", "ugv1") in {(e.kind, e.vehicle) for e in events}
+
+    def walled(obstacle: Obstacle) -> Scenario:
+        return replace(scenario, site=Site(base.site.areas, base.site.operating, (obstacle,)))
+
+    assert seen(scenario)
+    assert not seen(walled(wall))
+    assert seen(walled(replace(wall, height=0.2)))
+    x = np.arange(-10.0, 41.0, 0.5)
+    crest = Terrain((-10.0, -10.0), 0.5, np.tile(np.maximum(1.0 - np.abs(x - 16.0), 0.0), (81, 1)))
+    assert not seen(scenario, crest)
+    assert seen(scenario, Terrain((-10.0, -10.0), 0.5, np.zeros((81, 101))))
