@@ -1,4 +1,4 @@
-"""Triage in PyBullet: the same state machines, on vehicles that accelerate, turn and slip, and whose sight ends at walls."""
+"""Triage in PyBullet: the same state machines, on vehicles that turn and slip, and whose sight ends at walls."""
 
 import json
 from dataclasses import replace
@@ -47,7 +47,7 @@ def test_a_triage_plan_is_driven_as_the_fast_world_expects(tmp_path) -> None:  #
     treated = [e.about for e in run.triage.driven.log if e.what == "treated"]
     assert sorted(treated) == sorted(c.id for c in mission.casualties)
     fast, driven = run.report.triage["figures"]["time"]  # type: ignore[index]
-    assert fast == run_plan(mission).end
+    assert fast == pytest.approx(run_plan(mission).end, abs=1e-3)
     assert fast < driven < 2.0 * fast
     jsonschema.Draft202012Validator(report_schema()).validate(json.loads(run.report.to_json()))
 
