@@ -30,7 +30,12 @@ class State:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something observed: `kind` such as `lost`, `returned`, `seen`, `served`, `met`, `blocked`; who, and about what."""
+    """Something observed: `kind` such as `lost`, `returned`, `seen`, `served`, `met`, `blocked`; who, and about what.
+
+    `unreachable`: there is no way any more to the task `subject` (empty: to where the last command ends); `data` has the
+    place, `x` and `y`, and `found`, a MultiPolygon of all that the robot has found and the plan does not know. It stays
+    there until it is told something else.
+    """
 
     kind: str
     vehicle: str

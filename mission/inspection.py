@@ -2,11 +2,12 @@
 
 The plan's times are expectations; what releases a waiting vehicle is that its predecessors are done, whenever that is.
 If the vehicle that was to do one is lost, the task is not skipped: who waits for it goes on waiting at its place until a
-new plan comes, and when nobody moves any more, goes home with what is left undone.
+new plan comes, and when nobody moves any more, goes home with what is left undone. A task to which there is no way any
+more is left out, with all that comes after it, and the vehicle goes on to its next one.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from quarterdeck.mission.director import Command, Director, Event, State, fixed
@@ -28,14 +29,16 @@ class Memory:
     """What the director knows: how many stages each vehicle was `sent` to do, which vehicles are `waiting` at their next
     task.
 
-    `done` are the tasks served, `lost` the vehicles, `abandoned` the tasks that nobody will do any more.
+    `done` are the tasks served, `lost` the vehicles, `abandoned` the tasks that nobody will do any more, with the reason
+    for each; `stranded` the vehicles that have no way home.
     """
 
     sent: Mapping[str, int]
     waiting: frozenset[str] = frozenset()
     done: frozenset[str] = frozenset()
     lost: frozenset[str] = frozenset()
-    abandoned: frozenset[str] = frozenset()
+    abandoned: Mapping[str, str] = field(default_factory=dict)
+    stranded: frozenset[str] = frozenset()
 
 
 def inspection(mission: Mission) -> Director:
@@ -51,20 +54,31 @@ def inspection(mission: Mission) -> Director:
         done = known.done | {e.subject for e in events if e.kind == "served" and e.subject in before}
         lost = known.lost | {e.vehicle for e in events if e.kind == "lost"} | {v for v in stages if not states[v].alive}
         sent, waiting = dict(known.sent), set(known.waiting)
+        abandoned, stranded = dict(known.abandoned), set(known.stranded)
+        for e in events:
+            if e.kind == "unreachable" and e.vehicle in stages:
+                own = stages[e.vehicle]
+                task = e.subject or (own[sent[e.vehicle]].task if e.vehicle in waiting else None)
+                if task is None:
+                    stranded.add(e.vehicle)
+                else:  # what it was sent to do from there on is open again
+                    abandoned[task] = f"{e.vehicle} found no way to it"
+                    sent[e.vehicle] = next(n for n, s in enumerate(own) if s.task == task)
+        abandoned = _with_successors(abandoned, before)
         commands: dict[str, Command] = {}
         for vehicle in stages:
-            if states[vehicle].idle and vehicle not in lost:
-                way, sent[vehicle], wait = _onward(vehicle, sent[vehicle], vehicle in waiting, done, time)
-                waiting = waiting | {vehicle} if wait else waiting - {vehicle}
-                if way:
+            if (memory is None or states[vehicle].idle) and vehicle not in lost:
+                way, sent[vehicle], wait = _onward(vehicle, sent[vehicle], vehicle in waiting, done, abandoned, time)
+                (waiting.add if wait else waiting.discard)(vehicle)
+                if way or not states[vehicle].idle:  # a plan that begins in mid-course ends what was under way
                     commands[vehicle] = Command(way)
-        known = Memory(sent, frozenset(waiting), done, lost, known.abandoned)
+        known = Memory(sent, frozenset(waiting), done, lost, abandoned, frozenset(stranded))
         if not commands and waiting - lost and all(states[v].idle for v in stages if v not in lost):
             return _give_up(known, states)
         return commands, known
 
     def _onward(
-        vehicle: str, first: int, there: bool, done: frozenset[str], time: float
+        vehicle: str, first: int, there: bool, done: frozenset[str], abandoned: Mapping[str, str], time: float
     ) -> tuple[tuple[Waypoint, ...], int, bool]:
         """Return all that can be done from stage `first` on without waiting, the next stage, and whether to wait for it."""
         way: tuple[Waypoint, ...] = ()
@@ -72,6 +86,8 @@ def inspection(mission: Mission) -> Director:
             way += () if there and i == first else stage.way
             if stage.task is None or stage.service is None:
                 return way, i + 1, False
+            if stage.task in abandoned or stage.task in done:
+                continue
             if not before[stage.task] <= done:
                 return way, i, True
             if opens[stage.task] > time:  # when it will be there is not known: it drives there, then waits by the clock
@@ -84,17 +100,19 @@ def inspection(mission: Mission) -> Director:
 
     def _give_up(memory: Memory, states: Mapping[str, State]) -> tuple[dict[str, Command], Memory]:
         """Send home, by the way it came, whoever waits for what nobody will do."""
-        commands, sent, abandoned = {}, dict(memory.sent), set(memory.abandoned)
+        commands, sent, abandoned = {}, dict(memory.sent), dict(memory.abandoned)
         for vehicle in sorted(memory.waiting - memory.lost):
             own, here = stages[vehicle], sent[vehicle]
-            abandoned |= {s.task for s in own[here:] if s.task is not None}
+            for task in [s.task for s in own[here:] if s.task is not None]:
+                lacking = ", ".join(repr(t) for t in sorted(before[task] - memory.done))
+                abandoned.setdefault(task, f"{vehicle} waited for {lacking} in vain" if lacking else f"{vehicle} went home")
             start = next(route.waypoints[0] for route in mission.routes if route.vehicle == vehicle)
             way = [
                 replace(w, hold=0.0, task=None, time=0.0) for w in [start, *(w for s in own[: here + 1] for w in s.way)]
             ][-2::-1]
             commands[vehicle] = Command(_grounded(way) if states[vehicle].z else tuple(way))
             sent[vehicle] = len(own)
-        return commands, replace(memory, sent=sent, waiting=frozenset(), abandoned=frozenset(abandoned))
+        return commands, replace(memory, sent=sent, waiting=frozenset(), abandoned=abandoned)
 
     return direct
 
@@ -104,6 +122,16 @@ def default_director(mission: Mission) -> Director:
     if mission.method == METHOD:
         return director_of(mission)
     return inspection(mission) if mission.method == "assign" else fixed(mission)
+
+
+def _with_successors(gone: Mapping[str, str], before: Mapping[str, frozenset[str]]) -> dict[str, str]:
+    """Return the tasks that will not be done, with reasons, and all that comes after them."""
+    out = dict(gone)
+    while True:
+        after = {t: f"comes after {min(b & out.keys())!r}" for t, b in before.items() if t not in out and b & out.keys()}
+        if not after:
+            return out
+        out |= after
 
 
 def _stages(waypoints: tuple[Waypoint, ...], mission: Mission) -> list[_Stage]:

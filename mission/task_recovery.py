@@ -39,6 +39,11 @@ def assign_from_now(mission: Mission, scenario: Scenario, progress: Progress, *,
                 **_habits(mission.parameters),
             )
         except InputError as error:
+            shut = next((v for v in vehicles if str(error).startswith(f"vehicle {v.id!r}: there is no way")), None)
+            if shut is not None and shut.end != shut.start:
+                reasons.append(str(error))
+                vehicles = tuple(replace(v, end=v.start) if v is shut else v for v in vehicles)
+                continue
             lost = next((t for t in left if str(error).startswith(f"task {t.id!r}:")), None)
             if lost is None:
                 raise

@@ -47,6 +47,7 @@ MODES = ("known", "lidar", "gnss", "dead reckoning")
 PERIOD = 0.5  # s between updates of the particle filters
 REST = 5.0  # s from one recovery to the next: the filter needs some scans to tell the places apart
 BRIDGE = 5.0  # s that odometry bridges before GNSS takes over where the lidar sees too little
+SHARP = 0.1  # m: a receiver this good is good enough to draw a map by
 LAUNCHED = (0.1, 0.1, 0.05)  # m, m, radians: how well a robot knows where it was put down
 
 
@@ -127,6 +128,13 @@ class Navigation:
         off = self.believed - self.truth
         off[:, 2] = wrap(off[:, 2])
         return off
+
+    @property
+    def sure(self) -> np.ndarray:
+        """(k,) bool: knows its place well enough to put on a map what it sees."""
+        out = (self.mode == KNOWN) | (self.mode == BY_GNSS) & (math.hypot(self.receiver.white, self.receiver.slow) < SHARP)
+        out[self.lidar] = self.weak == 0
+        return out
 
     def _reckon(self, step: float, told: np.ndarray, deaf: np.ndarray, fix: bool) -> None:
         """Carry on the Kalman filters of the vehicles that live by fixes."""

@@ -17,6 +17,7 @@ from quarterdeck.mission.mission import Mission, Route
 from quarterdeck.physics.seen import seen_fraction, whole_tracks
 from quarterdeck.physics.swath import covered_fraction, driven_tracks, planned_tracks
 from quarterdeck.physics.swept import Swept, closest_approaches, excursion, sweep
+from quarterdeck.physics.task_report import TaskReport, task_reports
 from quarterdeck.physics.trace import Trace
 
 # What a run may come to and still pass; None is half of each vehicle's clearance.
@@ -108,6 +109,7 @@ class Report:
     vehicles: tuple[VehicleReport, ...]
     reasons: tuple[str, ...]
     trace_hash: str
+    tasks: tuple[TaskReport, ...] = ()
     command: Mapping[str, Any] | None = None
     notes: tuple[str, ...] = ()
     triage: Mapping[str, Any] | None = None  # casualties and figures, the fast world's beside the run's
@@ -159,12 +161,15 @@ def measure(
     localisation: Sequence[Mapping[str, Any]] | None = None,
     notes: Sequence[str] = (),
     triage: Mapping[str, Any] | None = None,
+    servers: Mapping[str, str] | None = None,
+    undone: Sequence[str] = (),
 ) -> Report:
     """Measure a trace against the mission and judge it.
 
     `finished` and `aground` are (k,), `served` the times at which tasks were, `lost` (k,) the vehicles lost by a fault
-    (default: none), `trouble` what went wrong, a line each, `localisation` what `Senses.report` returns,
-    `notes` what is told of a log, `triage` what `triage.Compared.document` returns.
+    (default: none), `trouble` what went wrong, a line each, `localisation` what `Senses.report` returns, `notes` what is
+    told of a log, `triage` what `triage.Compared.document` returns; `servers` the vehicles that served tasks, `undone` why
+    others were not served, as `task_reports` takes them.
     Raises InputError for an unknown limit.
     """
     allowed = check_limits(limits)
@@ -181,9 +186,22 @@ def measure(
     vehicles = tuple(replace(v, lost=g, localisation=p) for v, g, p in zip(vehicles, gone, places, strict=True))
     figures = _figures(mission, trace, vehicles, served)
     reasons = [*trouble, *_reasons(mission, vehicles, figures, allowed)]
-    words = tuple(reasons)
+    tasks = task_reports(mission, trace, served, servers or {}, undone)
+    reasons += [f"task {t.id!r} not served: {t.reason}" for t in tasks if t.reason] if allowed["unserved"] == 0 else []
+    reasons += [line for line in undone if not line.startswith("task ")]
+    told = tuple(reasons)
     return Report(
-        mission.name, VERSION, settings, allowed, figures, vehicles, words, trace.hash, notes=tuple(notes), triage=triage
+        mission.name,
+        VERSION,
+        settings,
+        allowed,
+        figures,
+        vehicles,
+        told,
+        trace.hash,
+        tasks,
+        notes=tuple(notes),
+        triage=triage,
     )
 
 

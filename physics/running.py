@@ -15,6 +15,9 @@ from quarterdeck.mission.mission import Mission, Waypoint
 from quarterdeck.mission.triage.plan import METHOD as TRIAGE
 from quarterdeck.physics.faults import Fault, active, next_change
 from quarterdeck.physics.fleet import Rovers, Squad, form_squads
+from quarterdeck.physics.navigation import REACH
+from quarterdeck.physics.paths import ROTATE, SAIL
+from quarterdeck.physics.rerouting import Rerouting
 from quarterdeck.physics.rover import climb_parameters
 from quarterdeck.physics.sensing import Legs, Senses, Sensing
 from quarterdeck.physics.separation import give_way, stop_for_others
@@ -51,6 +54,7 @@ class Running:
     time: float = 0.0
     memory: Any = None
     served: dict[str, float] = field(default_factory=dict)
+    servers: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         vehicles = self.mission.vehicles
@@ -88,7 +92,11 @@ class Running:
         self.senses: Senses | None = None
         if self.sensing != Sensing() or any(f.kind == "gnss" for f in self.faults):
             pose = np.column_stack([self.position[:, :2], self.heading])
-            self.senses = Senses(self.sensing, self.known, vehicles, pose, np.random.default_rng([self.seed, 0x5E]))
+            random = np.random.default_rng([self.seed, 0x5E])
+            self.senses = Senses(self.sensing, self.known, self.mission.site, vehicles, pose, random)
+        self.router: Rerouting | None = None
+        if self.senses is not None and len(self.senses.lidars):
+            self.router = Rerouting(self.known, vehicles, self.senses.lidars)
         blocking = [o for o in self.mission.site.obstacles if o.blocks & {v.domain for v in vehicles}]
         self.ground, self.pitch, self.roll, self.lift = (np.zeros(self.count) for _ in range(4))
         self.trouble: list[str] = []  # with the terrain
@@ -101,8 +109,9 @@ class Running:
 
     @property
     def finished(self) -> np.ndarray:
-        """(k,) bool: has done all it was told and was neither given up nor lost."""
-        return self._gather("idle") & ~self.aground & ~self.lost
+        """(k,) bool: has done all it was told and was neither given up nor lost, nor is without a way."""
+        stuck = np.isin(np.arange(self.count), list(self.router.stuck) if self.router else [])
+        return self._gather("idle") & ~self.aground & ~self.lost & ~stuck
 
     def advance(self) -> None:
         """One step of the world."""
@@ -144,7 +153,7 @@ class Running:
         """Call the director, see to mooring, launching and keeping clear; once a second."""
         if self.time >= self.change:
             self._befall()
-        reached = self._gather("reached")
+        reached = self._reached()
         self.events += self._serve(reached)
         mute = dict(zip(self.ids, self.suffering["comms"].tolist(), strict=True))
         if self.lookout is not None:  # each decides for itself: what passes between them is the director's business
@@ -154,6 +163,7 @@ class Running:
         self.events = [e for e in self.events if e not in events]
         commands, self.memory = self.director(self.time, self._states(reached, mute), events, self.memory)
         self.undelivered |= commands
+        fresh: set[int] = set()
         for i, id in enumerate(self.ids):  # noqa: A001
             if id in self.undelivered and not mute[id]:
                 command = self.undelivered.pop(id)
@@ -161,10 +171,14 @@ class Running:
                     squad, place = self._squad(i)
                     squad.command(place, command.waypoints)
                     self.commands[id], self.told[i] = command.waypoints, 0
+                    fresh.add(i)
         self._moor()
         if self.senses is not None:
             self.senses.note()
-        self.done = bool((self._gather("idle") & ~self.lost | self.aground | self.lost & ~self.aerial).all())
+            if self.router is not None:
+                self._reroute(self.senses, self.router, fresh)
+        idle = bool((self._gather("idle") & ~self.lost | self.aground | self.lost & ~self.aerial).all())
+        self.done = idle and all(mute[e.vehicle] for e in self.events)
 
     def record(self, builder: TraceBuilder) -> None:
         """Add a sample to the trace."""
@@ -301,6 +315,41 @@ class Running:
             self.events.append(Event("blocked", self.ids[i], data={"x": x, "y": y}))
         self.stalled = senses.stalled.copy()
 
+    def _reroute(self, senses: Senses, router: Rerouting, fresh: set[int]) -> None:
+        """Have robots with lidar put on their maps what they see, and drive around what bars their way."""
+        router.begin(fresh)
+        present, believed = ~self.moored & ~self.aground & ~self.lost, senses.navigation.believed
+        sure = senses.navigation.sure | self.sensing.mapping
+        router.look(believed, sure, senses.angles, senses.ranges, REACH, self.suffering["comms"], present)
+        actual, mode = self._gather("reached"), self._legs().mode
+        done = router.reached(actual)
+        for i in senses.lidars.tolist():
+            command = self.commands.get(self.ids[i], ())
+            if done[i] >= len(command) or not present[i] or (mode[i] not in (SAIL, ROTATE) and i not in fresh):
+                continue
+            ahead = router.driven(i, command)[actual[i] :]
+            others = believed[present & (np.arange(self.count) != i), :2]
+            detour = router.detour(
+                i, self.time, believed[i, :2], command, int(done[i]), ahead,
+                fresh=i in fresh, stalled=bool(senses.stalled[i]), others=others,
+            )  # fmt: skip
+            if detour is not None:
+                squad, place = self._squad(i)
+                squad.command(place, detour.waypoints)
+                router.detours[i] = detour
+            if detour is not None and not detour.waypoints:
+                router.stuck.add(i)
+                x, y, _ = believed[i].tolist()
+                data = {"x": x, "y": y, "found": router.obstacles(i)}
+                stop, rest = command[detour.onward], command[detour.onward :]
+                task = next((w.task for w in rest if w.task and (w.x, w.y) == (stop.x, stop.y)), "")
+                self.events.append(Event("unreachable", self.ids[i], task, data))
+
+    def _reached(self) -> np.ndarray:
+        """Return (k,) how many waypoints of its last command each has reached."""
+        actual = self._gather("reached")
+        return actual if self.router is None else self.router.reached(actual)
+
     def _legs(self) -> Legs:
         """Return the legs under way."""
         start, end = np.zeros((self.count, 2)), np.zeros((self.count, 2))
@@ -354,7 +403,7 @@ class Running:
         for i, vehicle in enumerate(self.mission.vehicles):
             for waypoint in self.commands.get(vehicle.id, ())[self.told[i] : reached[i]]:
                 if waypoint.task is not None:
-                    self.served[waypoint.task] = self.time
+                    self.served[waypoint.task], self.servers[waypoint.task] = self.time, vehicle.id
                     events.append(Event("served", vehicle.id, waypoint.task))
             self.told[i] = reached[i]
         return tuple(events)

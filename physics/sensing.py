@@ -28,27 +28,39 @@ CORRIDOR = 0.2  # m beside the hull: what stands so near to the leg is in the wa
 class Sensing:
     """What is sensed, instead of known. `gnss`: one of positioning.GNSS, or None for perfect fixes; `lidar`: ground robots
     see and steer clear; `amcl`: and localise by it. `unmapped` obstacles are there, but neither in the plan nor on the
-    robots' map.
+    robots' map; `world`, if given, is what is there in place of the plan's obstacles. `mapping`: robots draw a map, at the
+    places where they believe themselves to be, however sure they are.
     """
 
     gnss: str | None = None
     lidar: bool = False
     amcl: bool = False
     unmapped: tuple[Obstacle, ...] = ()
+    world: tuple[Obstacle, ...] | None = None
+    mapping: bool = False
     field: Literal["scaled", "paper"] = "scaled"
 
     def __post_init__(self) -> None:
+        if self.mapping and not (self.lidar or self.amcl):
+            raise InputError("a map is drawn of what robots see; let them have lidar or amcl")
         if self.gnss is not None and self.gnss not in GNSS:
             raise InputError(f"unknown GNSS {self.gnss!r}; known: {', '.join(GNSS)}")
 
 
 class Senses:
     """The senses of a run's fleet. `error` (k, 3) is what the vehicles believe less the truth; `bias` and `slow` (k,) what
-    the field adds to their courses, radians, and leaves of their speeds, m/s; `stalled` (k,) those that get no further.
+    the field adds to their courses, radians, and leaves of their speeds, m/s; `stalled` (k,) those that get no further;
+    `ranges` (lidars, b) the last scans. The fleet knows of `site` and is on the `real` one.
     """
 
     def __init__(
-        self, sensing: Sensing, site: Site, vehicles: Sequence[Vehicle], pose: np.ndarray, random: np.random.Generator
+        self,
+        sensing: Sensing,
+        site: Site,
+        real: Site,
+        vehicles: Sequence[Vehicle],
+        pose: np.ndarray,
+        random: np.random.Generator,
     ) -> None:
         count = len(vehicles)
         self.field = {"scaled": SCALED, "paper": PAPER}[sensing.field]
@@ -64,9 +76,12 @@ class Senses:
         known = None
         if len(self.lidars):
             solid = [o.polygon for o in site.obstacles if "ground" in o.blocks]
-            self.grid = edge_grid([*solid, *(o.polygon for o in sensing.unmapped if "ground" in o.blocks)])
-            self.hull = np.array([hull_reach(self.angles, *_size(vehicles[i]), MARGIN) for i in self.lidars.tolist()])
-            self.disc = np.array([np.hypot(*_size(vehicles[i])) / 2 + MARGIN for i in self.lidars.tolist()])
+            self.grid = edge_grid([o.polygon for o in real.obstacles if "ground" in o.blocks])
+            self.ranges = np.full((len(self.lidars), BEAMS), np.inf)
+            # Ahead as far as a corner reaches: where it stops it can turn.
+            sizes = [(np.hypot(*_size(vehicles[i])), _size(vehicles[i])[1]) for i in self.lidars.tolist()]
+            self.hull = np.array([hull_reach(self.angles, *size, MARGIN) for size in sizes])
+            self.disc = np.array([diagonal / 2 + MARGIN for diagonal, _ in sizes])
             self.half = np.array([vehicles[i].model.width / 2 + CORRIDOR for i in self.lidars.tolist()])
             # Beside its planned path, which keeps the clearance, a robot feels nothing.
             room = [vehicles[i].clearance - vehicles[i].model.width / 2 - MARGIN for i in self.lidars.tolist()]
@@ -89,7 +104,7 @@ class Senses:
             ground = np.array([v.domain == "ground" for v in self.vehicles]) & present
             discs = np.column_stack([pose[ground, :2], radius[ground]])
             clean = cast(self.grid, pose[self.lidars], self.angles, REACH, discs)
-            ranges = noisy(clean, self.random, deviation=NOISE, dropout=DROPOUT, reach=REACH)
+            ranges = self.ranges = noisy(clean, self.random, deviation=NOISE, dropout=DROPOUT, reach=REACH)
         self.navigation.step(time, step, pose, deaf, self.angles, ranges)
         if ranges is not None:
             self._steer(step, pose, present, ranges, legs)

@@ -12,6 +12,7 @@ from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.director import Director
 from quarterdeck.mission.inspection import default_director
 from quarterdeck.mission.mission import Mission
+from quarterdeck.mission.recovery import undone
 from quarterdeck.mission.triage.plan import METHOD
 from quarterdeck.physics.faults import read_faults
 from quarterdeck.physics.report import Report, measure
@@ -78,8 +79,8 @@ def simulate(
         until = max(until, TRIAGE) if duration is None else until
         limits = {"delay": LATE} | dict(limits or {})
     known, director = mission.site, director or default_director(mission)
-    if sensing.unmapped:
-        mission = replace(mission, site=replace(known, obstacles=(*known.obstacles, *sensing.unmapped)))
+    there = known.obstacles if sensing.world is None else sensing.world
+    mission = replace(mission, site=replace(known, obstacles=(*there, *sensing.unmapped)))
     with open_world(step) as world:
         air = np.array([*wind, 0.0])
         run = Running(mission, director, world, seed, np.array(current), air, gusts, befalling, sensing, known, terrain)
@@ -121,6 +122,7 @@ def simulate(
         "field": sensing.field,
         "terrain": None if terrain is None else [*terrain.origin, terrain.cell, *terrain.heights.shape],
         "unmapped": [o.id for o in sensing.unmapped],
+        "world": None if sensing.world is None else [o.id for o in sensing.world],
     }
     report = measure(
         mission,
@@ -134,6 +136,8 @@ def simulate(
         trouble=[*run.trouble, *(compared.driven.reasons if compared else ())],
         localisation=run.senses.report() if run.senses else None,
         triage=compared.document() if compared else None,
+        servers=run.servers,
+        undone=undone(run.memory),
     )
     return Run(trace, report, compared)
 

@@ -1,0 +1,221 @@
+"""What robots with lidar find that their map does not have, and their way around it.
+
+All robots that are in contact put what they see into one map; one that nobody hears goes on with its own copy, and what it
+saw counts when it is heard again. Where what was found bars the way ahead, a robot plans anew by A* to where it next has
+something to do. Where there is no way any more, it stops and says so.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+from scipy.ndimage import distance_transform_edt
+from shapely import LineString, MultiPolygon
+
+from quarterdeck.geo.gridpath import find_ways, nearest_free
+from quarterdeck.geo.occupancy import FREE, Occupancy, site_occupancy
+from quarterdeck.geo.scenario import Site, Vehicle, as_multipolygon
+from quarterdeck.mission.mission import Waypoint
+from quarterdeck.physics.mapping import WALL, Evidence, fuse, no_evidence
+
+CELL = 0.1  # m
+KNOWN = 0.3  # m: echoes so near to what the map has are of that: walls are not quite where a robot believes them
+SLACK = 0.7  # of the clearance: a way that keeps this much of it from what was found is left as it is
+OTHERS = 0.5  # m about the hull of another robot in contact, whose echoes are no obstacle
+AGAIN = 10.0  # s between two attempts of a robot that gets no further
+LOOK = 5.0  # s for which it looks on before it says that there is no way
+PATIENCE = 60.0  # s without getting further, after which there is no way
+
+
+@dataclass(frozen=True, slots=True)
+class Detour:
+    """What a robot drives instead of its command: `via` waypoints, then the command's from number `onward` on.
+
+    `done` of the command's were reached before. `waypoints` are all of them; none where there is no way: then it stays.
+    """
+
+    waypoints: tuple[Waypoint, ...]
+    via: int
+    onward: int
+    done: int
+
+
+class Rerouting:
+    """The maps and detours of the robots `lidars` (n,), places among `vehicles`, on the `site` that their plan knows."""
+
+    def __init__(self, site: Site, vehicles: Sequence[Vehicle], lidars: np.ndarray) -> None:
+        self.site, self.vehicles, self.lidars = site, vehicles, lidars
+        self.shared = no_evidence(site, CELL)
+        self.apart: dict[int, Evidence] = {}  # the maps of robots that are not heard
+        self.detours: dict[int, Detour] = {}
+        self.stalled = np.full(len(vehicles), np.inf)  # since when
+        self.tried = np.full(len(vehicles), -np.inf)
+        self.barred = np.full(len(vehicles), np.inf)  # since when there is no way
+        self.stuck: set[int] = set()  # those that have no way
+        self.free: dict[float, np.ndarray] = {}
+
+    def begin(self, fresh: Iterable[int]) -> None:
+        """Forget the detours of robots that have a fresh command."""
+        for i in fresh:
+            self.detours.pop(i, None)
+            self.stuck.discard(i)
+            self.barred[i], self.stalled[i] = np.inf, np.inf
+
+    def driven(self, i: int, command: tuple[Waypoint, ...]) -> tuple[Waypoint, ...]:
+        """Return all waypoints of what robot `i` drives: its detour, or its command."""
+        return self.detours[i].waypoints if i in self.detours else command
+
+    def look(
+        self,
+        believed: np.ndarray,
+        sure: np.ndarray,
+        angles: np.ndarray,
+        ranges: np.ndarray,
+        reach: float,
+        mute: np.ndarray,
+        present: np.ndarray,
+    ) -> None:
+        """Put the scans (n, b) of robots at `believed` (k, 3) on their maps.
+
+        Those that are not `sure` (k,) of their place add nothing. Echoes of robots that are `present` and not `mute` (k,)
+        are of no obstacle.
+        """
+        for i in [i for i in self.apart if not mute[i]]:
+            seen = self.apart.pop(i).values
+            stronger = np.abs(seen) > np.abs(self.shared.values)
+            self.shared.values[stronger] = seen[stronger]
+        for i in np.intersect1d(np.flatnonzero(mute), self.lidars).tolist():
+            if i not in self.apart:
+                self.apart[i] = replace(self.shared, values=self.shared.values.copy())
+        size = np.array([np.hypot(v.model.length, v.model.width) / 2 + OTHERS for v in self.vehicles])
+        for n, i in enumerate(self.lidars.tolist()):
+            if not (sure[i] and present[i]):
+                continue
+            others = np.flatnonzero(present & ~mute)
+            others = others[others != i]
+            bearing, told = believed[i, 2] + angles, ranges[n].copy()
+            ends = believed[i, :2] + np.where(np.isfinite(told), told, 0.0)[:, None] * np.column_stack(
+                [np.cos(bearing), np.sin(bearing)]
+            )
+            away = np.hypot(*(ends[:, None] - believed[others, :2]).transpose(2, 0, 1))
+            told[(away < size[others]).any(axis=1)] = np.nan
+            fuse(self.map_of(i), believed[i], angles, told, reach)
+
+    def map_of(self, i: int) -> Evidence:
+        """Return the evidence that robot `i` has."""
+        return self.apart.get(i, self.shared)
+
+    def found(self, i: int) -> np.ndarray:
+        """Return (m, 2) metres: the centres of the cells where robot `i` knows of something that its map does not have."""
+        cells = np.argwhere((self.map_of(i).values > WALL) & (self._clear_of(KNOWN)))
+        return self._grid(i).to_metres(cells + 0.5)
+
+    def obstacles(self, i: int) -> MultiPolygon:
+        """Return what robot `i` has found as polygons in metres."""
+        half, at = 0.5 * self.shared.cell, self.found(i)
+        cells = shapely.box(at[:, 0] - half, at[:, 1] - half, at[:, 0] + half, at[:, 1] + half)
+        return as_multipolygon(shapely.union_all(cells).buffer(half, join_style="mitre").simplify(half))
+
+    def detour(
+        self,
+        i: int,
+        time: float,
+        here: np.ndarray,
+        command: tuple[Waypoint, ...],
+        done: int,
+        ahead: Sequence[Waypoint],
+        *,
+        fresh: bool,
+        stalled: bool,
+        others: np.ndarray,
+    ) -> Detour | None:
+        """Return another way for robot `i`, now `here` (2,), if its own is barred; None if it may go on as it does.
+
+        `done` of its `command`'s waypoints are reached, `ahead` are those that it now makes for. Its way is looked at when
+        the command is `fresh`, and against what was found; when it has `stalled`, it looks for a way around the `others`
+        (m, 2) too.
+        """
+        vehicle, grid = self.vehicles[i], self._grid(i)
+        stop = next((j for j, w in enumerate(command[done:], done) if _to_do(w)), len(command) - 1)
+        self.stalled[i] = min(self.stalled[i], time) if stalled else np.inf
+        if stalled:
+            if time > self.stalled[i] + PATIENCE:
+                return Detour((), 0, stop, done)
+            if time < self.tried[i] + AGAIN:
+                return None
+            self.tried[i] = time
+        elif ahead[0].leg != "transit" or not self._barred(i, here, ahead, fresh=fresh or np.isfinite(self.barred[i])):
+            self.barred[i] = np.inf
+            return None
+        free = self._clear_of(vehicle.clearance) & _aside(grid, self.found(i), vehicle.clearance)
+        if stalled:
+            free &= _aside(grid, others, 2 * vehicle.model.length)
+        # Who is nearer to a thing than the clearance goes to the nearest place that is not, as plans do.
+        reach = vehicle.clearance + 2 * grid.resolution
+        for j in range(stop, len(command)):
+            goal = np.array([command[j].x, command[j].y])
+            ends = nearest_free(grid, free, np.array([here, goal]), reach)
+            path = find_ways(grid, free, ends, "octile").path(0, 1)
+            if path is not None:
+                path = path[1:] if np.hypot(*(path[0] - here)) < CELL and len(path) > 2 else path
+                via = tuple(Waypoint(x, y, speed=command[j].speed) for x, y in path[:-1].tolist())
+                self.barred[i] = np.inf
+                x, y = path[-1].tolist()
+                onward = [replace(w, x=x, y=y) if _same(w, goal) else w for w in command[j:]]
+                return Detour((*via, *onward), len(via), j, done)
+            if command[j].task is not None:
+                break
+        if stalled:
+            return None
+        self.barred[i] = min(self.barred[i], time)
+        return Detour((), 0, stop, done) if time >= self.barred[i] + LOOK else None
+
+    def reached(self, actual: np.ndarray) -> np.ndarray:
+        """Return (k,) how many waypoints of their commands robots have reached: `actual` (k,) are of what they drive."""
+        out = actual.copy()
+        for i, d in self.detours.items():
+            out[i] = d.done if actual[i] <= d.via else d.onward + actual[i] - d.via
+        return out
+
+    def _barred(self, i: int, here: np.ndarray, ahead: Sequence[Waypoint], *, fresh: bool) -> bool:
+        """Whether what was found, or, on a fresh command, what is known lies in the way to where something is to do."""
+        stop = next((j for j, w in enumerate(ahead) if _to_do(w)), len(ahead) - 1)
+        points = np.array([here, *((w.x, w.y) for w in ahead[: stop + 1])])
+        way, keep = LineString(points), SLACK * self.vehicles[i].clearance
+        if fresh and not shapely.dwithin(shapely.Point(here), shapely.Point(points[1]), 0.5):
+            leg, solid = LineString(points[:2]), [o.polygon for o in self.site.obstacles if "ground" in o.blocks]
+            if shapely.dwithin(leg, solid, self.vehicles[i].model.width / 2).any():
+                return True
+        at = self.found(i)
+        return bool(len(at)) and bool(shapely.dwithin(way, shapely.MultiPoint(at), keep))
+
+    def _clear_of(self, margin: float) -> np.ndarray:
+        """Return (rows, cols) bool: the cell keeps `margin` metres from what the plan's map has."""
+        if margin not in self.free:
+            made = site_occupancy(self.site, "ground", self.shared.cell, margin)
+            self.free[margin] = made.cells == FREE
+        return self.free[margin]
+
+    def _grid(self, i: int) -> Occupancy:
+        evidence = self.map_of(i)
+        return Occupancy(evidence.values, evidence.cell, evidence.origin)
+
+
+def _to_do(waypoint: Waypoint) -> bool:
+    return waypoint.task is not None or waypoint.hold > 0 or waypoint.leg != "transit"
+
+
+def _same(waypoint: Waypoint, place: np.ndarray) -> bool:
+    return waypoint.x == place[0] and waypoint.y == place[1]
+
+
+def _aside(grid: Occupancy, places: np.ndarray, margin: float) -> np.ndarray:
+    """Return (rows, cols) bool: the cell's centre is at least `margin` metres from all (m, 2) `places`."""
+    clear = np.ones(grid.cells.shape, bool)
+    cells = np.floor(grid.to_cells(places)).astype(int)
+    cells = cells[((cells >= 0) & (cells < clear.shape)).all(axis=1)]
+    if len(cells):
+        clear[cells[:, 0], cells[:, 1]] = False
+        clear = distance_transform_edt(clear) * grid.resolution >= margin
+    return clear
