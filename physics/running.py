@@ -305,7 +305,7 @@ class Running:
         pose = np.column_stack([self.position[:, :2], self.heading])
         step = self.world.step
         deaf, present = self.suffering["gnss"], ~self.moored & ~self.aground & ~self.lost
-        senses.step(self.time + step, step, pose, deaf, present, self._legs())
+        senses.step(self.time + step, step, pose, deaf, present, self.moored, self._legs())
         for squad in self.squads:
             squad.error[:] = senses.error[squad.index]
             squad.tracks["slow"] = np.minimum(self.slow, senses.slow)[squad.index]

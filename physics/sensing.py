@@ -96,12 +96,23 @@ class Senses:
         """(k, 3) believed less true x, y and heading."""
         return self.navigation.error
 
-    def step(self, time: float, step: float, pose: np.ndarray, deaf: np.ndarray, present: np.ndarray, legs: "Legs") -> None:
-        """See, localise and steer after a step to `pose` (k, 3). `deaf` (k,): without GNSS; `present` (k,): out there."""
+    def step(
+        self,
+        time: float,
+        step: float,
+        pose: np.ndarray,
+        deaf: np.ndarray,
+        present: np.ndarray,
+        moored: np.ndarray,
+        legs: "Legs",
+    ) -> None:
+        """See, localise and steer after a step to `pose` (k, 3). `deaf` (k,): without GNSS; `present` (k,): at work;
+        `moored` (k,): at home, where nobody sees it.
+        """
         ranges = None
         if len(self.lidars):
             radius = np.array([min(v.model.length, v.model.width) / 2 for v in self.vehicles])
-            ground = np.array([v.domain == "ground" for v in self.vehicles]) & present
+            ground = np.array([v.domain == "ground" for v in self.vehicles]) & ~moored
             discs = np.column_stack([pose[ground, :2], radius[ground]])
             clean = cast(self.grid, pose[self.lidars], self.angles, REACH, discs)
             ranges = self.ranges = noisy(clean, self.random, deviation=NOISE, dropout=DROPOUT, reach=REACH)
