@@ -50,8 +50,8 @@ def recovering(mission: Mission, *, delay: float = 0.0, tell: Callable[[float, M
 
     Who is heard of again within the delay was a false alarm; who comes back later takes a part of what is left. Where a
     robot finds no way to a task, what it found becomes an obstacle of the new plan, and the task goes to who can reach it.
-    `tell` gets the time and each new plan. A loss that nobody is left to recover from changes nothing. A triage team sees to
-    its losses itself.
+    `tell` gets the time and each new plan. A loss that nobody is left to recover from changes nothing. A triage team sees
+    to its losses itself.
     """
     if mission.method == METHOD:
         return default_director(mission)
