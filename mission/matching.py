@@ -8,7 +8,7 @@ from numba import njit
 
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.mission import Mission, Route, unbroken
-from quarterdeck.mission.tracks import Track
+from quarterdeck.mission.tracks import Track, at_rest
 
 OFF = 9.0  # what a place far off a leg costs, at the most; one as far off as the tolerance costs 1
 JUMP = 10 * OFF  # what going on at any other leg costs: as much as ten places far off
@@ -65,22 +65,22 @@ def off_legs(route: Route, leg: np.ndarray, places: np.ndarray) -> tuple[np.ndar
     return along, length, places - start - (along / np.maximum(length, 1e-9))[:, None] * span
 
 
-def planned_time(route: Route, track: Track, followed: Followed) -> float:
+def planned_time(vehicle: Vehicle, route: Route, track: Track, followed: Followed) -> float:
     """Return when, by the plan, the vehicle would be where its track ends: how far along its route it is, in seconds."""
     if not route.waypoints:
         return 0.0
     last = followed.leg[-1:]
-    along, length, _ = off_legs(route, last, track.xy[-1:])
+    along, length, _ = off_legs(route, last, _places(vehicle, track)[-1:])
     number = int(last[0])
     a, b = route.waypoints[max(number - 1, 0)], route.waypoints[number]
     part = float(np.clip(along[0] / max(length[0], 1e-9), 0.0, 1.0)) if length[0] > 0 else 1.0
     for corner, w in ((part * length[0], a), ((1.0 - part) * length[0], b)):
         apart = np.hypot(track.x - w.x, track.y - w.y) > HERE
         if w.hold > 0 and corner <= HERE and not apart[-1]:  # it waits: for how long already is told by the track
-            since = track.time[len(apart) - int(np.argmax(apart[::-1]))] if apart.any() else track.time[0]
-            return w.time + min(w.hold, float(track.time[-1] - since))
+            first = len(apart) - int(np.argmax(apart[::-1])) if apart.any() else 0
+            return float(w.time) + min(w.hold, float(track.time[-1]) - at_rest(track, slice(first, len(apart)), last=False))
     left = a.time + a.hold
-    return left + part * (b.time - left)
+    return float(left + part * (b.time - left))
 
 
 HERE = 2.0  # m: at a waypoint
@@ -88,8 +88,7 @@ HERE = 2.0  # m: at a waypoint
 
 def _legs(vehicle: Vehicle, route: Route, track: Track, near: float) -> np.ndarray:
     """Return (n,) waypoint numbers; 0 everywhere for a route without legs."""
-    aerial = vehicle.domain == "aerial" and bool(np.isfinite(track.z).all())
-    places = np.column_stack([track.x, track.y, track.z]) if aerial else track.xy
+    places = _places(vehicle, track)
     points = route.xyz[:, : places.shape[1]]
     if len(points) < 2:
         return np.zeros(len(places), np.int64)
@@ -103,6 +102,12 @@ def _legs(vehicle: Vehicle, route: Route, track: Track, near: float) -> np.ndarr
     latest = np.searchsorted(kept, np.arange(len(places)), side="right") - 1
     leg, coming = found[latest] + 1, found[np.minimum(latest + 1, len(kept) - 1)] + 1
     return np.where(_away(route, coming, places) < _away(route, leg, places), coming, leg)
+
+
+def _places(vehicle: Vehicle, track: Track) -> np.ndarray:
+    """Return (n, 3) places of an aerial vehicle whose height is known, else (n, 2)."""
+    aerial = vehicle.domain == "aerial" and bool(np.isfinite(track.z).all())
+    return np.column_stack([track.x, track.y, track.z]) if aerial else track.xy
 
 
 def _away(route: Route, leg: np.ndarray, places: np.ndarray) -> np.ndarray:

@@ -15,7 +15,8 @@ class Progress:
     """The state of a mission `time` seconds after its start.
 
     `positions` are (x, y, z) metres by vehicle, `energy` watt-hours used by vehicle, `tracks` (n, 2) lines in metres along
-    which survey legs were driven, `served` the ids of tasks done.
+    which survey legs were driven, `served` the ids of tasks done. `along` says how far along its route each vehicle is, as
+    the seconds at which it would be there by the plan; None: as planned, at `time`.
     """
 
     time: float
@@ -23,6 +24,7 @@ class Progress:
     energy: Mapping[str, float] = field(default_factory=dict)
     tracks: tuple[np.ndarray, ...] = ()
     served: frozenset[str] = frozenset()
+    along: Mapping[str, float] | None = None
 
 
 def planned_progress(mission: Mission, time: float, *, stopped: Mapping[str, float] | None = None) -> Progress:

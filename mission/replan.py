@@ -12,6 +12,7 @@ from quarterdeck.mission.changes import changed_site, check_changes
 from quarterdeck.mission.guard_recovery import guards_from_now, with_confirmed
 from quarterdeck.mission.mission import Mission, Route, Waypoint
 from quarterdeck.mission.progress import Progress, energy_left
+from quarterdeck.mission.recorded import as_planned
 from quarterdeck.mission.survey_recovery import survey_from_now
 from quarterdeck.mission.task_recovery import assign_from_now, tasks_left
 from quarterdeck.mission.timing import shortfalls, timed_route
@@ -29,7 +30,7 @@ def replan(mission: Mission, progress: Progress, changes: Changes = NOTHING, *, 
     Raises InputError if a change names what is not in the plan, means nothing to it, or nobody is left.
     """
     check_changes(mission, changes)
-    if not changes:
+    if not changes and as_planned(mission, progress):
         return with_confirmed(_rest(mission, progress), progress.served)
     seed = mission.seed if seed is None else seed
     site = changed_site(mission.site, changes)
@@ -139,12 +140,14 @@ def _rest(mission: Mission, progress: Progress) -> Mission:
 
 def _route_left(route: Route, progress: Progress, vehicle: Vehicle) -> Route:
     here = progress.positions[vehicle.id]
-    ahead = [w for w in route.waypoints if w.time > progress.time]
-    current = [w for w in route.waypoints if w.time <= progress.time][-1:]
-    hold = max(0.0, current[0].time + current[0].hold - progress.time) if current else 0.0
+    now = progress.time if progress.along is None else progress.along[vehicle.id]
+    ahead = [w for w in route.waypoints if w.time > now]
+    current = [w for w in route.waypoints if w.time <= now][-1:]
+    hold = max(0.0, current[0].time + current[0].hold - now) if current else 0.0
     start = Waypoint(*here, "start", 0.0, hold, 0.0, current[0].task if hold and current else None)
-    moved = tuple(replace(w, time=w.time - progress.time) for w in ahead)
-    return Route(route.vehicle, (start, *moved), max(0.0, route.energy - progress.energy.get(vehicle.id, 0.0)))
+    moved = tuple(replace(w, time=w.time - now) for w in ahead)
+    energy = route.energy * max(0.0, 1.0 - now / route.duration) if route.duration else 0.0
+    return Route(route.vehicle, (start, *moved), energy)
 
 
 def _airborne(route: Route, vehicle: Vehicle, progress: Progress) -> Route:

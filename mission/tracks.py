@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.logs import Log, read_logs
@@ -18,6 +19,7 @@ LEAP = 10.0  # m beyond twice the greatest speed: a longer step is a jump
 BRIEF = 5.0  # s: fixes that jump away for no longer are wrong; for longer, it was moved
 FAR = 100_000.0  # m from the site: not this plan's
 SPELL = 3600.0  # s between the first and the last to set off, beyond the plan's: not one mission
+PLACES, LITTLE = 500, 0.2  # of a track looked at; a part that is too little
 NEAR = 4.0  # lengths: so near its start or end a vehicle is there
 
 
@@ -113,7 +115,11 @@ def record(mission: Mission, files: Sequence[Sequence[tuple[str, Log]]], *, star
         logs.setdefault(name, []).append(log)
         notes += [n for n in log.notes if n not in notes]
     raw = {}
+    routes = {r.vehicle: r for r in mission.routes if r.waypoints}
     for vehicle in mission.vehicles:
+        if vehicle.id not in routes:
+            reasons.append(f"{vehicle.id}: the plan has no route for it")
+            continue
         if vehicle.id not in logs:
             reasons.append(f"{vehicle.id}: no track given")
             continue
@@ -123,7 +129,6 @@ def record(mission: Mission, files: Sequence[Sequence[tuple[str, Log]]], *, star
         reasons += wrong
         if track is not None:
             raw[vehicle.id] = (whole, track)
-    routes = {r.vehicle: r for r in mission.routes}
     began = {i: _began(mission.vehicle(i), routes[i], log, track) for i, (log, track) in raw.items()}
     clocked = {i: began[i] for i, (log, _) in raw.items() if log.clock == "unix"}
     if start is None and clocked:
@@ -139,7 +144,27 @@ def record(mission: Mission, files: Sequence[Sequence[tuple[str, Log]]], *, star
         if abs(late) > SPELL:
             reasons.append(f"{vehicle_id}: sets off {late:,.0f} s after the mission's start; is its log of another day?")
         tracks.append(_until_home(mission.vehicle(vehicle_id), routes[vehicle_id], moved))
+    reasons += _on_other_routes(mission, tracks)
     return Record(tuple(tracks), tuple(notes), tuple(reasons), start)
+
+
+def _on_other_routes(mission: Mission, tracks: Sequence[Track]) -> list[str]:
+    """Return a line for each track that hardly touches its own route; it names another's that it is all along."""
+    lines = {r.vehicle: shapely.LineString(r.xyz[:, :2]) for r in mission.routes if len(r.waypoints) > 1}
+    told = []
+    for track in tracks:
+        near = 0.25 * mission.spacing if mission.spacing else max(5.0, 2 * mission.vehicle(track.vehicle).model.length)
+        way = np.r_[0.0, np.cumsum(np.hypot(*np.diff(track.xy, axis=0).T))]
+        if track.vehicle not in lines or way[-1] <= 2 * near:
+            continue
+        at = np.searchsorted(way, np.linspace(0.0, way[-1], PLACES))
+        places = shapely.points(track.xy[np.minimum(at, len(way) - 1)])
+        share = {vehicle: float(shapely.dwithin(places, line, near).mean()) for vehicle, line in lines.items()}
+        other = max(share, key=lambda v: share[v])
+        if share[track.vehicle] < LITTLE:
+            also = f"; it follows that of {other}: are the files exchanged?" if share[other] > 1 - LITTLE else ""
+            told.append(f"{track.vehicle}: only {share[track.vehicle]:.0%} of its way is along its route{also}")
+    return told
 
 
 def _joined(vehicle: str, logs: list[Log]) -> Log:
@@ -265,7 +290,7 @@ def _began(vehicle: Vehicle, route: Route, log: Log, track: Track) -> float:
     else:
         first = int(np.argmax(near))
         out = first + int(np.argmin(np.r_[near[first:], False]))  # the first after it that is not near
-        left = _rest(track, slice(first, out), last=True)
+        left = at_rest(track, slice(first, out), last=True)
     taken = [b for b in log.begun if b <= left + 1.0]
     wait = route.waypoints[0].hold if route.waypoints else 0.0
     return max(taken) if taken else left - wait
@@ -274,7 +299,7 @@ def _began(vehicle: Vehicle, route: Route, log: Log, track: Track) -> float:
 MOMENT, CREEP = 5.0, 0.1  # s, m: who moves less in that time, but for the receiver's noise, is at rest
 
 
-def _rest(track: Track, stay: slice, *, last: bool) -> float:
+def at_rest(track: Track, stay: slice, *, last: bool) -> float:
     """Return when in a stay the vehicle was last at rest, or first to stay so to its end; its border if it never was."""
     xyz, time = np.column_stack([track.x, track.y, np.nan_to_num(track.z)])[stay], track.time[stay]
     if last:  # seen backwards, it is to come to rest
@@ -306,7 +331,7 @@ def _until_home(vehicle: Vehicle, route: Route, track: Track) -> Track:
     if not there[-1] or there.all():
         return track
     first = len(there) - int(np.argmin(there[::-1]))
-    arrived = _rest(track, slice(first, len(there)), last=False)
+    arrived = at_rest(track, slice(first, len(there)), last=False)
     stays = track.time <= arrived
     cut = {n: getattr(track, n)[stays] for n in ("time", "x", "y", "z", "heading", "speed", "energy", "broken")}
     return Track(track.vehicle, **cut, arrived=arrived)

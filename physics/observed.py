@@ -1,6 +1,7 @@
 """A real mission measured as a simulated one: the trace that its logs come to, and the report of it."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,11 @@ from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.matching import Followed, follow, off_legs
 from quarterdeck.mission.mission import Mission, Route
+from quarterdeck.mission.recorded import progress_state, recorded_progress
 from quarterdeck.mission.served import served_tasks
 from quarterdeck.mission.tracks import NEAR, Record, Track
 from quarterdeck.physics.paths import LEGS, vehicle_limits
-from quarterdeck.physics.report import measure
+from quarterdeck.physics.report import Report, measure
 from quarterdeck.physics.seen import unseen, whole_tracks
 from quarterdeck.physics.simulate import Run
 from quarterdeck.physics.swath import TOLERANCE, driven_tracks
@@ -53,6 +55,26 @@ def report_tracks(
         notes=(*record.notes, *notes),
     )
     return Run(trace, report)
+
+
+def tracks_of(trace: Trace) -> tuple[Track, ...]:
+    """Return a simulated run's trace as tracks."""
+    nothing = np.zeros(len(trace.time), bool)
+    columns = ("x", "y", "z", "heading", "speed", "energy")
+    return tuple(
+        Track(vehicle, trace.time, **{n: getattr(trace, n)[:, i] for n in columns}, broken=nothing)
+        for i, vehicle in enumerate(trace.vehicles)
+    )
+
+
+def with_state(mission: Mission, report: Report, tracks: Sequence[Track]) -> Report:
+    """Return the report with where the mission stands at the end of its tracks; as it is where not all have a route."""
+    if {r.vehicle for r in mission.routes if r.waypoints} != {v.id for v in mission.vehicles}:
+        return report
+    until = max((float(t.time[-1]) for t in tracks), default=0.0)
+    unheard = {v.id: 0.0 for v in mission.vehicles if v.id not in {t.vehicle for t in tracks}}
+    progress, _ = recorded_progress(mission, tracks, until, stopped=unheard)
+    return replace(report, state=progress_state(mission, progress))
 
 
 def missed(mission: Mission, trace: Trace) -> BaseGeometry:

@@ -98,7 +98,8 @@ class VehicleReport:
 class Report:
     """A run's figures, the limits that they were held against, and why it failed (`reasons`; it passed when there are
     none). `command` has the `options` of the command line that it came of, and the SHA-256 of the `files` among them.
-    `notes` say what of a log was left out or reckoned; a simulated run has none.
+    `notes` say what of a log was left out or reckoned; a simulated run has none. `state` is where its end leaves the
+    mission (`mission.recorded.progress_state`), for `replan --state`.
     """
 
     mission: str
@@ -113,6 +114,7 @@ class Report:
     command: Mapping[str, Any] | None = None
     notes: tuple[str, ...] = ()
     triage: Mapping[str, Any] | None = None  # casualties and figures, the fast world's beside the run's
+    state: Mapping[str, Any] | None = None
 
     @property
     def passed(self) -> bool:

@@ -1,15 +1,39 @@
 """`quarterdeck replan`: the mission from now on, from what has happened so far."""
 
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
 import click
 
-from quarterdeck.cli.output import emit, force_option, output_option, print_figures, time_limit_option
+from quarterdeck.cli.output import (
+    console,
+    emit,
+    force_option,
+    output_option,
+    print_figures,
+    print_reason,
+    time_limit_option,
+)
 from quarterdeck.cli.parameters import Real
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from quarterdeck.mission.mission import Mission
+    from quarterdeck.mission.progress import Progress
 
 
 @click.command(short_help="From what has happened so far: losses, changes, additions, withdrawals.")
 @click.argument("plan")
 @output_option
-@click.option("--at", "time", type=Real(min=0), required=True, help="Seconds since the mission's start.")
+@click.option("--at", "time", type=Real(min=0), help="Seconds since the mission's start; default: as far as the logs go.")
+@click.option("--track", "tracks", metavar="[VEHICLE=]FILE", multiple=True,
+              help="A log of what really happened, as for `report`; repeatable. Without: all went as planned.")  # fmt: skip
+@click.option("--start", metavar="TIME", help="When the mission began, as 2026-06-01T12:00:00Z; default: by the logs.")
+@click.option("--state", metavar="REPORT", help="A report of `simulate` or `report` instead of logs.")
 @click.option("--changes", "changed", metavar="GEOJSON", help="All that is different, a feature a change: docs/replan.md.")
 @click.option("--lost", default="", help="Ids of the vehicles that are lost, with commas; ID@SECONDS: since when.")
 @click.option("--add", metavar="SITE", help="GeoJSON of what is new: obstacles, areas, tasks, vehicles that join.")
@@ -21,8 +45,11 @@ from quarterdeck.cli.parameters import Real
 def command(
     plan: str,
     output: str,
-    time: float,
+    time: float | None,
     changed: str | None,
+    tracks: tuple[str, ...],
+    start: str | None,
+    state: str | None,
     lost: str,
     add: str | None,
     gone: str,
@@ -36,7 +63,6 @@ def command(
     from quarterdeck.geo.errors import InputError
     from quarterdeck.mission.changes import Changes, read_changes
     from quarterdeck.mission.planfile import plan_text, read_plan
-    from quarterdeck.mission.progress import planned_progress
     from quarterdeck.mission.replan import replan
 
     mission = read_plan(plan)
@@ -44,19 +70,60 @@ def command(
     for item in _ids(lost):
         vehicle, _, moment = item.partition("@")
         try:
-            since[vehicle] = float(moment) if moment else time
+            since[vehicle] = float(moment) if moment else math.inf
         except ValueError:
             raise InputError(f"--lost {item}: {moment!r} is no number of seconds; write ID or ID@SECONDS") from None
     gone_ids, withdrawn_ids = frozenset(_ids(gone)), frozenset(_ids(withdrawn))
     changes = Changes(lost=frozenset(since), since=since, gone=gone_ids, withdrawn=withdrawn_ids)
     for source in (add, changed):
         changes |= read_changes(source, mission) if source else Changes()
-    stopped = {v: changes.since.get(v, time) for v in changes.lost}
-    so_far = planned_progress(mission, time, stopped=stopped)
+    stopped = {v: changes.since.get(v, math.inf) for v in changes.lost}
+    so_far = _progress(mission, time, tracks, start, state, stopped)
     after = within(time_limit, lambda: replan(mission, so_far, changes, seed=seed))
     emit(plan_text(after), output, force=force)
     print_figures(after)
     return 0 if after.feasible else 1
+
+
+def _progress(
+    mission: Mission,
+    time: float | None,
+    tracks: tuple[str, ...],
+    start: str | None,
+    state: str | None,
+    stopped: Mapping[str, float],
+) -> Progress:
+    """Return what has happened so far: by logs, by a report, or by the plan."""
+    from quarterdeck.geo.errors import InputError
+    from quarterdeck.geo.logs import read_time
+    from quarterdeck.mission.progress import planned_progress
+    from quarterdeck.mission.recorded import read_state, recorded_progress
+    from quarterdeck.mission.tracks import read_tracks
+
+    if tracks and state:
+        raise InputError("--track and --state both say what happened; give one of them")
+    if start and not tracks:
+        raise InputError("--start says when the logs' mission began; it needs --track")
+    if state:
+        progress = read_state(mission, state, lost=frozenset(stopped))
+        if time is not None and time < progress.time - 1.0:
+            raise InputError(f"--at {time:g}: {state} is of {progress.time:.0f} s; leave --at out, or give --track")
+        if any(math.isfinite(since) for since in stopped.values()):
+            raise InputError("--lost ID@SECONDS needs --track: a report does not tell what was done when; write --lost ID")
+        return progress if time is None else replace(progress, time=time)
+    if tracks:
+        record = read_tracks(mission, tracks, start=read_time(start) if start else None)
+        wrong = [r for r in record.reasons if not any(r.startswith(f"{v}: no track") for v in stopped)]
+        if wrong:
+            raise InputError(wrong[0])
+        now = max(float(t.time[-1]) for t in record.tracks) if time is None else time
+        progress, notes = recorded_progress(mission, record.tracks, now, stopped=stopped)
+        for note in (*record.notes, *notes):
+            print_reason(console(), "note", note)
+        return progress
+    if time is None:
+        raise InputError("--at is missing: seconds since the mission's start; or give --track or --state")
+    return planned_progress(mission, time, stopped=stopped)
 
 
 def _ids(text: str) -> list[str]:

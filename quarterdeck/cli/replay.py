@@ -100,7 +100,7 @@ def report_again(report: dict[str, Any], options: dict[str, Any], files: dict[st
         _, run = simulate.execute(**given)
     except (click.BadParameter, TypeError) as error:
         raise InputError(f"the report's options cannot be used ({error}); simulate the plan again") from None
-    again = json.loads(replace(run.report, command=report["command"]).to_json())
+    again = json.loads(replace(run.report, command=report["command"], state=report.get("state")).to_json())
     found = differences(report, again, within)
     return [d for d in found if not (within and d[0] == "trace_hash")]
 

@@ -46,17 +46,19 @@ def command(
 
     Exit status 1 if the verdict fails, or a log is not of this plan.
     """
+    from dataclasses import replace
     from datetime import UTC, datetime
 
     from quarterdeck.geo.logs import read_time
     from quarterdeck.mission.planfile import read_plan
     from quarterdeck.mission.tracks import read_tracks
-    from quarterdeck.physics.observed import report_tracks
+    from quarterdeck.physics.observed import report_tracks, with_state
 
     mission = read_plan(plan)
     record = read_tracks(mission, tracks, start=read_time(start) if start else None)
     began = None if record.start is None else datetime.fromtimestamp(record.start, UTC).isoformat()
     run = report_tracks(mission, record, limits=dict(limits), settings={"tracks": list(tracks), "start": began})
+    run = replace(run, report=with_state(mission, run.report, record.tracks))
     if report:
         emit(run.report.to_json(), report, force=force)
     if rrd:

@@ -136,6 +136,10 @@ def command(
         mission, run = execute(**options)
     if trace:
         emit(run.trace.to_bytes(mission.frame), trace, force=force)
+    if report or as_json:
+        from quarterdeck.physics.observed import tracks_of, with_state
+
+        run = replace(run, report=with_state(mission, run.report, tracks_of(run.trace)))
     if report:
         emit(run.report.to_json(), report, force=force)
     if rrd:
