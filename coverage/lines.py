@@ -14,6 +14,7 @@ from shapely import MultiPolygon
 
 from quarterdeck.coverage.laps import lay_laps
 from quarterdeck.coverage.line_order import alternate_order, order_from, short_order
+from quarterdeck.coverage.spread import Spread, strips
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.grid import TOLERANCE, Grid
 from quarterdeck.geo.scenario import as_multipolygon
@@ -110,6 +111,7 @@ def lay_lines(
     entry: tuple[float, float] | None = None,
     alternate: int = 0,
     lap: MultiPolygon | None = None,
+    spread: Spread | None = None,
 ) -> Lines:
     """Cover `part` of `area` by parallel lines at most `spacing` metres apart, and link them on `road`.
 
@@ -118,6 +120,7 @@ def lay_lines(
     `run` metres are driven straight before and after each line where the road allows. `cross_every` n > 0 adds lines
     across, n spacings apart. The route begins near `start`, or with the end of a line that is nearest to `entry`.
     `alternate` n > 1 drives every nth line and the skipped ones on the way back; it begins with an outermost line.
+    With a `spread` lines are as far from each other as it allows where they are, cross-lines apart.
     The boundary of `lap` that lies in the part (`coverage.laps.lap_space`) is driven before all lines.
     Raises InputError if an option is out of range.
     """
@@ -131,8 +134,8 @@ def lay_lines(
     if part.is_empty:
         return Lines((), (), angle or 0.0)
     if angle is None:
-        angle = _best_angle(area, part, spacing, turn_cost)
-    pieces = _pieces(area, part, spacing, angle)
+        angle = _best_angle(area, part, spacing, turn_cost, spread)
+    pieces = _pieces(area, part, spacing, angle, spread)
     cross = _pieces(area, part, cross_every * spacing, angle + np.pi / 2) if cross_every else np.zeros((0, 2, 2))
     swaths = [*_swaths(pieces, road, run, "L", False), *_swaths(cross, road, run, "X", True)]
     lines, across = swaths[: len(pieces)], swaths[len(pieces) :]
@@ -143,7 +146,7 @@ def lay_lines(
     return _linked(laps, route, road, angle)
 
 
-def _best_angle(area: MultiPolygon, part: MultiPolygon, spacing: float, turn_cost: float) -> float:
+def _best_angle(area: MultiPolygon, part: MultiPolygon, spacing: float, turn_cost: float, spread: Spread | None) -> float:
     """Return the direction in [0, pi) with the least length of lines, `turn_cost` added for each."""
     corners, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(part)), return_index=True)
     step = np.diff(corners, axis=0)[ring[1:] == ring[:-1]]
@@ -153,12 +156,14 @@ def _best_angle(area: MultiPolygon, part: MultiPolygon, spacing: float, turn_cos
     angles = np.unique(np.round(np.concatenate([along, np.arange(0, np.pi, np.pi / 18)]), 9))
     costs = []
     for angle in angles:
-        lines = _pieces(area, part, spacing, float(angle))
+        lines = _pieces(area, part, spacing, float(angle), spread)
         costs.append(np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum() + turn_cost * len(lines))
     return float(angles[int(np.argmin(costs))])
 
 
-def _pieces(area: MultiPolygon, part: MultiPolygon, spacing: float, angle: float) -> np.ndarray:
+def _pieces(
+    area: MultiPolygon, part: MultiPolygon, spacing: float, angle: float, spread: Spread | None = None
+) -> np.ndarray:
     """Return the (n, 2, 2) pieces of the lines at `angle` that survey `part`, line after line."""
     cos, sin = np.cos(angle), np.sin(angle)
     turn = np.array([[cos, -sin], [sin, cos]])
@@ -166,21 +171,25 @@ def _pieces(area: MultiPolygon, part: MultiPolygon, spacing: float, angle: float
     space, wanted = (shapely.transform(g, lambda xy: xy @ turn) for g in (inner, part))
     left, bottom, right, top = shapely.total_bounds([space, wanted])
     _, bottom, _, top = wanted.bounds
-    count = max(1, int(np.ceil((top - bottom) / spacing - 1e-9)))
-    height = (top - bottom) / count
-    lows = bottom + height * np.arange(count)
-    strips = shapely.intersection(shapely.box(left, lows, right, lows + height), wanted)
-    shapes, strip = shapely.get_parts(strips, return_index=True)
+    if spread is None:
+        count = max(1, int(np.ceil((top - bottom) / spacing - 1e-9)))
+        heights = np.full(count, (top - bottom) / count)
+        lows = bottom + heights[0] * np.arange(count)
+    else:
+        inside = shapely.contains_xy(part, *spread.places.T)
+        lows, heights = strips((spread.places[inside] @ turn)[:, 1], spread.widths[inside], bottom, top)
+    stripes = shapely.intersection(shapely.box(left, lows, right, lows + heights), wanted)
+    shapes, strip = shapely.get_parts(stripes, return_index=True)
     bounds = shapely.bounds(shapes)
-    middles = lows[strip] + height / 2.0
+    middles = (lows + heights / 2.0)[strip]
     reach = shapely.linestrings(np.stack([bounds[:, [0, 2]], np.column_stack([middles, middles])], axis=2))
     reach = reach[bounds[:, 2] > bounds[:, 0]]
     merged = shapely.get_parts(shapely.line_merge(shapely.union_all(reach))) if len(reach) else reach
-    inside = shapely.get_parts(shapely.intersection(merged, space))
-    inside = inside[(shapely.get_type_id(inside) == 1) & (shapely.length(inside) >= SHORTEST * spacing)]
-    ends = np.stack([shapely.get_coordinates(shapely.get_point(inside, n)) for n in (0, -1)], axis=1).reshape(-1, 2, 2)
+    kept = shapely.get_parts(shapely.intersection(merged, space))
+    kept = kept[(shapely.get_type_id(kept) == 1) & (shapely.length(kept) >= SHORTEST * spacing)]
+    ends = np.stack([shapely.get_coordinates(shapely.get_point(kept, n)) for n in (0, -1)], axis=1).reshape(-1, 2, 2)
     ends = np.sort(ends, axis=1)  # left to right: the two differ in x alone
-    order = np.lexsort((ends[:, 0, 0], np.round(ends[:, 0, 1] / height)))
+    order = np.lexsort((ends[:, 0, 0], np.searchsorted(lows, ends[:, 0, 1], side="right")))
     return ends[order] @ turn.T
 
 

@@ -143,7 +143,21 @@ def chart_site(
     parts = as_multipolygon(obstacles.intersection(kept.buffer(margin)))
     found = tuple(Obstacle(f"danger-{i}", p) for i, p in enumerate(sorted(parts.geoms, key=lambda p: p.bounds), 1))
     site = Site((Area("water", kept),), kept, found)
-    return Scenario("chart", frame, site, tuple(_vehicle(*s) for s in starts)), tuple(notes)
+    spots = _spots(cells, frame, kept)
+    notes.append(f"soundings: {len(spots)} in the water that is left, for the swath of a multibeam sonar")
+    return Scenario("chart", frame, site, tuple(_vehicle(*s) for s in starts), soundings=spots), tuple(notes)
+
+
+def _spots(cells: Sequence[Cell], frame: Frame, water: BaseGeometry) -> tuple[tuple[float, float, float], ...]:
+    """Return x, y and depth of all cells' SOUNDG spots in the water; where cells have the same one it is there once."""
+    found = {
+        (round(x, 2), round(y, 2), round(depth, 2))
+        for cell in cells
+        for shape, depth in cell.objects.get("SOUNDG", ())
+        for x, y in shapely.get_coordinates(_metres(frame, shape)).tolist()
+        if np.isfinite(depth)
+    }
+    return tuple(spot for spot in sorted(found) if water.covers(shapely.Point(spot[:2])))
 
 
 def _frame(cells: Sequence[Cell], bounds: tuple[float, float, float, float] | None) -> Frame:

@@ -19,6 +19,7 @@ GEOMETRIES = {
     "casualty": ("Point",),
     "medic": ("Point",),
     "rendezvous": ("Point",),
+    "sounding": ("Point",),
 }
 # What QGIS, geojson.io and our own PLAN put beside ours: never taken for a misspelling.
 FOREIGN = {"name", "title", "description", "fid", "fill", "fill-opacity", "stroke", "stroke-width", "stroke-opacity",
@@ -136,6 +137,10 @@ PROPERTIES: dict[str, dict[str, Property]] = {
     },
     "medic": {"id": _ID},
     "rendezvous": {"id": _ID},
+    "sounding": {
+        "id": _ID,
+        "depth": Property(NUMBER, "a number", "metres of water, below chart datum on a chart; needed"),
+    },
 }
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from shapely import MultiPoint, MultiPolygon, Point
 from shapely.ops import unary_union
 
+from quarterdeck.geo.depths import least_depth, read_soundings
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.geojson import Document, opened, position_problem, positions, read_corridor, read_polygon
@@ -113,7 +114,9 @@ def _read(
     spacings = sorted({f["properties"]["spacing"] for f in features if f["properties"].get("spacing") is not None})
     if len(spacings) > 1:
         problems.append(f"areas give different spacings ({', '.join(f'{s:g}' for s in spacings)}); give one")
-    vehicles = [_vehicle(f, frame, problems) for f in features if f["role"] == "vehicle"]
+    soundings = read_soundings([f for f in features if f["role"] == "sounding"], frame, problems)
+    least = least_depth(soundings, [shapes[f["place"]] for f in features if f["role"] == "area"])
+    vehicles = [_vehicle(f, frame, problems, least) for f in features if f["role"] == "vehicle"]
     if problems:
         return None, problems
     fleet = tuple(v for v in vehicles if v is not None)
@@ -135,6 +138,7 @@ def _read(
         rendezvous=points["rendezvous"],
         spacing=spacings[0] if spacings else None,
         input_hash=hashlib.sha256(document.data).hexdigest(),
+        soundings=soundings,
     )
     problems += _area_problems(features)
     problems += _vehicle_problems(features, scenario)
@@ -237,7 +241,7 @@ def _xy(feature: dict[str, Any], frame: Frame) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def _vehicle(feature: dict[str, Any], frame: Frame, problems: list[str]) -> Vehicle | None:
+def _vehicle(feature: dict[str, Any], frame: Frame, problems: list[str], depth: float | None) -> Vehicle | None:
     """Return a vehicle, its model's figures where it gives none of its own."""
     given = {k: v for k, v in feature["properties"].items() if v is not None}
     try:
@@ -264,7 +268,7 @@ def _vehicle(feature: dict[str, Any], frame: Frame, problems: list[str]) -> Vehi
     sensor, altitude = None, float(given.get("altitude", model.altitude))
     if "sensor" in given:
         try:
-            sensor, altitude = fit(given["sensor"], given.get("altitude"), model.altitude)
+            sensor, altitude = fit(given["sensor"], given.get("altitude"), model.altitude, depth)
         except InputError as error:
             problems.append(f"{feature['place']}: sensor: {error}")
             return None

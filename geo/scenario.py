@@ -149,7 +149,8 @@ class Casualty:
 class Scenario:
     """One scenario, as read from GeoJSON. `spacing` is the distance between neighbouring tracks in metres, if given.
 
-    `input_hash` is the SHA-256 of the file's bytes; `medics` and `rendezvous` are (x, y) points by id.
+    `input_hash` is the SHA-256 of the file's bytes; `medics` and `rendezvous` are (x, y) points by id,
+    `soundings` x, y and depth in metres.
     """
 
     name: str
@@ -162,6 +163,7 @@ class Scenario:
     rendezvous: tuple[tuple[str, tuple[float, float]], ...] = ()
     spacing: float | None = None
     input_hash: str = ""
+    soundings: tuple[tuple[float, float, float], ...] = ()
 
     @property
     def starts(self) -> np.ndarray:

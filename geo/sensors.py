@@ -25,12 +25,15 @@ _FIGURES = ("focal_length", "sensor_width", "sensor_height", "image_width", "ima
 _MOST_RESOLUTION = 10.0  # m a pixel: more is a mistake of units
 
 
-def fit(given: Mapping[str, Any], altitude: float | None, default_altitude: float = 0.0) -> tuple[Sensor, float]:
+def fit(
+    given: Mapping[str, Any], altitude: float | None, default_altitude: float = 0.0, least_depth: float | None = None
+) -> tuple[Sensor, float]:
     """Return the sensor with its `swath`, and the altitude to fly at, in metres.
 
     `given` is the scenario's object: `kind`, and for a camera `camera` (a name of CAMERAS) or its five figures (mm and
     pixels), `frontal_overlap` and `side_overlap` (default 0.7), and if `altitude` is None maybe `ground_resolution` in
-    metres a pixel, from which it follows. A sonar has `depth` (the least, m) and `angle` (whole opening, degrees), or
+    metres a pixel, from which it follows. A sonar has `depth` (the least, m; without it `least_depth`, as sounded, and
+    the parameters have none, for it differs from place to place) and `angle` (whole opening, degrees), or
     `range` (slant, m) and `height` above the bottom, and `overlap` (default 0.2). The swath is what a pass adds: overlap
     is taken off. Raises InputError naming the figure that is missing or wrong.
     """
@@ -44,7 +47,8 @@ def fit(given: Mapping[str, Any], altitude: float | None, default_altitude: floa
             raise InputError('a sensor of kind "swath" needs "swath", metres above 0')
         return Sensor(kind, float(given["swath"]), figures), flown
     if kind == "sonar":
-        return Sensor("sonar", sonar_swath(figures), figures), flown
+        sounded = {"depth": least_depth} if least_depth is not None and "angle" in figures else {}
+        return Sensor("sonar", sonar_swath(sounded | figures), figures), flown
     return _camera(given, figures, altitude, default_altitude)
 
 
@@ -108,6 +112,13 @@ def swath(sensor: Sensor, distance: float | None = None) -> float:
     if sensor.kind == "camera":
         return footprint(sensor.parameters, distance)[0] * (1 - sensor.parameters["side_overlap"])
     return sonar_swath({**sensor.parameters, ("depth" if "angle" in sensor.parameters else "height"): distance})
+
+
+def follows_depth(sensor: Sensor | None) -> bool:
+    """Return whether a sensor is a multibeam sonar whose swath follows the depths that were sounded."""
+    return (
+        sensor is not None and sensor.kind == "sonar" and "angle" in sensor.parameters and "depth" not in sensor.parameters
+    )
 
 
 def _overlap(figures: Mapping[str, float], name: str, default: float) -> float:

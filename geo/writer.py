@@ -26,6 +26,7 @@ def site_text(scenario: Scenario) -> str:
         *(point_feature(frame, "task", t.position, t.id, **_task(t)) for t in scenario.tasks),
         *(point_feature(frame, "medic", xy, i) for i, xy in scenario.medics),
         *(point_feature(frame, "rendezvous", xy, i) for i, xy in scenario.rendezvous),
+        *(point_feature(frame, "sounding", (x, y), f"s{i}", depth=d) for i, (x, y, d) in enumerate(scenario.soundings, 1)),
         *(
             point_feature(frame, "casualty", c.position, c.id, colour=c.colour, **{"marker-color": CASUALTY[c.colour]})
             for c in scenario.casualties

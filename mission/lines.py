@@ -1,7 +1,7 @@
 """Parallel lines: the division of a placed grid, each region surveyed by lines, as sonar and camera teams expect."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -16,8 +16,11 @@ from quarterdeck.geo.scenario import Scenario, Vehicle
 from quarterdeck.geo.transit import Roadmap, shortest_paths
 from quarterdeck.geo.version import VERSION
 from quarterdeck.mission.cover import covering, divided, roadmaps, trackable
-from quarterdeck.mission.mission import Layer, Leg, Mission
+from quarterdeck.mission.mission import Layer, Leg, Mission, Route
 from quarterdeck.mission.routes import way_routes
+from quarterdeck.mission.seafloor import seen, spreads
+
+ROUNDS = 2  # of dividing again, once it is known how much there is to drive where
 
 
 def plan_lines(
@@ -34,21 +37,22 @@ def plan_lines(
 ) -> Mission:
     """Return the mission that surveys the scenario's areas by parallel lines, `spacing` metres apart.
 
-    `angle` is the lines' direction in radians counter-clockwise from east (None: each vehicle's cheapest), `run` the metres
+    Without a spacing, where soundings are known, a multibeam sonar's lines follow the depth (`mission.seafloor`). `angle`
+    is the lines' direction in radians counter-clockwise from east (None: each vehicle's cheapest), `run` the metres
     driven straight before and after each line, `cross_every` n > 0 adds lines across, n spacings apart. Each
     vehicle's lines begin at the end nearest to `entry`, (x, y) metres (None: where the way is short). `alternate` n > 1
     drives every nth line and the skipped ones on the way back. `lap`: before the lines, each drives what is in its part of
     one lap along the border and around obstacles, half a spacing in. Raises InputError as `cover` does.
     """
     step = covering(scenario, spacing)
+    fixed = spacing is not None or scenario.spacing is not None
+    wide = [None] * len(scenario.vehicles) if fixed else spreads(scenario)
+    sounded = [s.widths for s in wide if s is not None]
+    if sounded:
+        step = max(step, float(np.median(np.concatenate(sounded))))  # of the grid that divides; lines have their own
     area = trackable(scenario, step)
     grid = place(area, step, seed=seed, angle=angle).grid
     vehicles, roads = scenario.vehicles, roadmaps(scenario)
-    regions, notes = divided(scenario, grid, roads, shares(vehicles), seed)
-    labels = np.full(grid.hypervertices.shape, -1)
-    for i, region in enumerate(regions):
-        labels[region.mask] = i
-    parts = split_area(area, grid, labels, len(vehicles))
     habits: dict[str, Any] = {
         "angle": angle,
         "run": run,
@@ -57,26 +61,42 @@ def plan_lines(
         "alternate": alternate,
     }
     space = lap_space(scenario.site.coverable, area, step) if lap else None
-    laid = [
-        lay_lines(area, part, step, road, start=v.start, lap=space, **habits)
-        for v, part, road in zip(vehicles, parts, roads, strict=True)
-    ]
-    ways = [_way(v, lines, road) for v, lines, road in zip(vehicles, laid, roads, strict=True)]
-    routes, reasons = way_routes(vehicles, [(points, legs) for points, legs, _ in ways], roads)
-    missing = [reason for _, _, found in ways for reason in found]
-    missing += [
-        f"{v.id}: no way to {lines.unreached} pieces of its lines"
-        for v, lines in zip(vehicles, laid, strict=True)
-        if lines.unreached
-    ]
+
+    def attempt(parts_of_all: np.ndarray) -> _Attempt:
+        regions, notes = divided(scenario, grid, roads, parts_of_all, seed)
+        labels = np.full(grid.hypervertices.shape, -1)
+        for i, region in enumerate(regions):
+            labels[region.mask] = i
+        parts = split_area(area, grid, labels, len(vehicles))
+        laid = [
+            lay_lines(area, part, step, road, start=v.start, lap=space, spread=spread, **habits)
+            for v, part, road, spread in zip(vehicles, parts, roads, wide, strict=True)
+        ]
+        return _Attempt(laid, notes, *_routes(vehicles, laid, roads))
+
+    wanted = shares(vehicles)
+    done = attempt(wanted)
+    for _ in range(ROUNDS if sounded and len(vehicles) > 1 and vehicles[0].share is None else 0):
+        # Where it is shoal there is more to drive: shares that count it make the slowest sooner done.
+        wanted = wanted / np.array([max(r.duration, 1.0) for r in done.routes])
+        wanted /= wanted.sum()
+        again = attempt(wanted)
+        if again.makespan >= done.makespan:
+            break
+        done = again
+    laid, routes, reasons = done.laid, done.routes, done.reasons
     figures = asdict(measure([t for lines in laid for t in lines.tracks], scenario.site.coverable, grid))
     del figures["turns"], figures["turns_per_1000_m2"], figures["cell_poc"]  # of lanes of a grid; there is none here
+    if sounded:  # one width does not say what is covered
+        del figures["overlap"]
+        figures |= seen(scenario, vehicles, routes)
+        figures["poc"] = figures.pop("seafloor_coverage", figures["poc"])
     figures |= {
         "lines": sum(len(lines.swaths) for lines in laid),
         **({"laps": sum(len(lines.laps) for lines in laid)} if lap else {}),
         "makespan": max(r.duration for r in routes),
         "energy": sum(r.energy for r in routes),
-        "notes": notes,
+        "notes": done.notes,
     }
     return Mission(
         name=scenario.name,
@@ -85,16 +105,45 @@ def plan_lines(
         vehicles=vehicles,
         routes=routes,
         method="lines",
-        parameters={"spacing": step} | habits | {"lap": lap},
+        parameters={"spacing": None if sounded else step} | habits | {"lap": lap},
         seed=seed,
         spacing=step,
         tasks=scenario.tasks,
         figures=figures,
-        reasons=tuple(missing + reasons),
+        reasons=tuple(reasons),
         layers=(_named(vehicles, laid),),
         input_hash=scenario.input_hash,
         version=VERSION,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Attempt:
+    """A division's lines, notes on it, routes along them, and why they cannot be driven."""
+
+    laid: list[Lines]
+    notes: list[str]
+    routes: tuple[Route, ...]
+    reasons: list[str]
+
+    @property
+    def makespan(self) -> tuple[int, float]:
+        """Less is better: what cannot be done, then seconds."""
+        return len(self.reasons), max(r.duration for r in self.routes)
+
+
+def _routes(
+    vehicles: Sequence[Vehicle], laid: Sequence[Lines], roads: Sequence[Roadmap]
+) -> tuple[tuple[Route, ...], list[str]]:
+    ways = [_way(v, lines, road) for v, lines, road in zip(vehicles, laid, roads, strict=True)]
+    routes, reasons = way_routes(vehicles, [(points, legs) for points, legs, _ in ways], roads)
+    missing = [reason for _, _, found in ways for reason in found]
+    missing += [
+        f"{v.id}: no way to {lines.unreached} pieces of its lines"
+        for v, lines in zip(vehicles, laid, strict=True)
+        if lines.unreached
+    ]
+    return routes, missing + reasons
 
 
 def _way(vehicle: Vehicle, lines: Lines, road: Roadmap) -> tuple[np.ndarray, list[Leg], list[str]]:

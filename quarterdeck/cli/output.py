@@ -137,6 +137,7 @@ WORDS = {
     "makespan": ("makespan", "{:,.0f} s", 1.0),
     "ratio": ("over its bound", "{:.2f}", 1.0),
     "energy": ("energy", "{:,.0f} Wh", 1.0),
+    "least_overlap": ("least overlap", "{:.1f} %", 100.0),
     "lowest_above_ground": ("lowest above ground", "{:.1f} m", 1.0),
     "highest_above_ground": ("highest", "{:.1f} m", 1.0),
     "highest_amsl": ("highest above sea", "{:.1f} m", 1.0),

@@ -155,3 +155,16 @@ def test_the_sample_chart_is_what_its_maker_makes(tmp_path):
     subprocess.run([sys.executable, root / "examples" / "make_chart.py", tmp_path / "chart"], check=True)
     for ending in (".000", ".001"):
         assert (tmp_path / f"chart{ending}").read_bytes() == (root / "data" / f"sample_chart{ending}").read_bytes()
+
+
+def test_spots_become_soundings_of_the_site():
+    """Spots in the water that is left, of all cells and each once; those on land or without a depth are not."""
+    spots = (
+        (Point(10.015, 54.005), 7.5),
+        (Point(10.018, 54.002), 9.0),
+        (Point(10.002, 54.005), 0.3),
+        (Point(10.011, 54.001), NAN),
+    )
+    scenario, notes = chart_site([cell("A", SOUNDG=spots), cell("B", SOUNDG=spots[:1])], depth=2.0)
+    assert sorted(d for _, _, d in scenario.soundings) == [7.5, 9.0]
+    assert any(line.startswith("soundings: 2 in the water") for line in notes)
