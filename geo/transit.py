@@ -33,10 +33,7 @@ class Roadmap:
 
 def roadmap(polygon: MultiPolygon) -> Roadmap:
     """Return the roadmap of a polygon, such as `Site.navigable`; only a reflex vertex can be a shortest path's corner."""
-    # A passage of no width, where two obstacles touch, is none: opening the polygon by a hair, a little less out than in,
-    # closes it.
-    hair = {"join_style": "mitre", "mitre_limit": 10.0}
-    polygon = as_multipolygon(polygon.buffer(-10 * TOUCH, **hair).buffer(8 * TOUCH, **hair))
+    polygon = without_chinks(polygon)
     rings = [shapely.get_coordinates(r) for p in shapely.orient_polygons(polygon).geoms for r in (p.exterior, *p.interiors)]
     nodes, edges = [], []
     for ring in rings:
@@ -52,6 +49,12 @@ def roadmap(polygon: MultiPolygon) -> Roadmap:
     first, second = np.triu_indices(len(corners), 1)
     seen = _clear(corners[first], corners[second], segments)
     return Roadmap(polygon, grown, corners, segments, np.column_stack([first[seen], second[seen]]))
+
+
+def without_chinks(polygon: MultiPolygon) -> MultiPolygon:
+    """Return a polygon to move in without passages of no width, where two obstacles touch: a hair is shaved off it."""
+    hair = {"join_style": "mitre", "mitre_limit": 10.0}
+    return as_multipolygon(polygon.buffer(-10 * TOUCH, **hair).buffer(8 * TOUCH, **hair))
 
 
 def shortest_paths(

@@ -40,6 +40,8 @@ def assign(
     twin: Occupancy | None = None,
     resolution: float | None = None,
     heuristic: Heuristic = "none",
+    quick: bool = False,
+    first: Sequence[Sequence[int]] | None = None,
     iterations: int = ITERATIONS,
     time_limit: float | None = None,
     seed: int = 0,
@@ -52,20 +54,24 @@ def assign(
     `shape` (`tours.schedule.shaped`) with its two parameters. `tiers`: no vehicle does a task of lower priority before one
     of higher. `paper` is eq. 4-6 of the paper, every precedence in the same robot, searched as the paper does.
 
-    Distances are on `twin`, a map in the scenario's frame, or on a map made of the site in cells of `resolution` metres.
+    Distances are on `twin`, a map in the scenario's frame, or on a map made of the site in cells of `resolution` metres;
+    `quick`: on the site's polygons. `first` are each vehicle's tasks, by number, to begin the search with; not all need be
+    in it.
     The search takes `iterations`, or as many as fit into `time_limit` seconds of `clock`; `progress` gets iteration, best
     objective and bound. Raises InputError if tasks or vehicles lack, or a task cannot be done by anybody. What the plan
     found cannot meet (windows, endurance, battery) is told in the mission's `reasons`.
     """
     tasks, vehicles = scenario.tasks, scenario.vehicles
     _check(scenario, weights, shape)
-    ways = travel(scenario, twin, resolution=resolution, heuristic=heuristic, plain=objective == "paper")
+    ways = travel(scenario, twin, resolution=resolution, heuristic=heuristic, plain=objective == "paper", quick=quick)
     parameters = shape_parameters or SHAPE[shape]
     p = _problem(scenario, ways, objective, weights, shape, parameters, tiers)
     if objective == "paper":
         found = paper_search(p, generations=iterations, time_limit=time_limit, seed=seed, clock=clock, progress=progress)
     else:
-        found = search(p, iterations=iterations, time_limit=time_limit, seed=seed, clock=clock, progress=progress)
+        found = search(
+            p, iterations=iterations, time_limit=time_limit, first=first, seed=seed, clock=clock, progress=progress
+        )
     before = {i: np.flatnonzero(p.pred[i]).tolist() for i in range(len(tasks))}
     routes, visits = itineraries(vehicles, tasks, found.rows, ways, before)
     reasons = [r for v, route in zip(vehicles, routes, strict=True) for r in shortfalls(v, route)]

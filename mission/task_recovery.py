@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 
 from quarterdeck.geo.errors import InputError
-from quarterdeck.geo.scenario import Scenario, Task
+from quarterdeck.geo.scenario import Scenario, Task, Vehicle
 from quarterdeck.mission.assign import assign
 from quarterdeck.mission.cover import roadmaps
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.progress import Progress
 from quarterdeck.mission.routes import line_routes
+from quarterdeck.mission.timing import seconds_out, shortfalls
 
-GENERATIONS = 30  # of the search: robots are waiting
+GENERATIONS = 3  # of the search, which begins with what is left of the plan: robots are waiting
 HABITS = ("objective", "weights", "shape", "shape_parameters", "tiers")  # of a plan that hold for what is left of it too
 THERE = 1.0  # m beyond its clearance: a vehicle so near to where it serves a task is there
 
@@ -29,28 +30,34 @@ def assign_from_now(mission: Mission, scenario: Scenario, progress: Progress, *,
     """
     vehicles = tuple(replace(v, can=v.can | {_itself(v.id)}) for v in scenario.vehicles)
     tasks = tasks_left(mission, scenario.tasks, progress, {v.id for v in scenario.vehicles})
-    left, reasons, undone = list(tasks), [], []
+    left, reasons, undone = list(tasks), list[str](), list[str]()
     while left:
+        given: dict[str, Any] = {
+            "first": _rows(mission, vehicles, left),
+            "quick": True,
+            "iterations": GENERATIONS,
+            "seed": seed,
+        }
+        dropped: dict[str, str] = {}
         try:
-            after = assign(
-                replace(scenario, vehicles=vehicles, tasks=tuple(left)),
-                iterations=GENERATIONS,
-                seed=seed,
-                **_habits(mission.parameters),
-            )
+            after = assign(replace(scenario, vehicles=vehicles, tasks=tuple(left)), **given, **_habits(mission.parameters))
+            dropped = dict.fromkeys(_too_much(after), "the energy left does not suffice")
         except InputError as error:
             shut = next((v for v in vehicles if str(error).startswith(f"vehicle {v.id!r}: there is no way")), None)
             if shut is not None and shut.end != shut.start:
                 reasons.append(str(error))
                 vehicles = tuple(replace(v, end=v.start) if v is shut else v for v in vehicles)
                 continue
-            lost = next((t for t in left if str(error).startswith(f"task {t.id!r}:")), None)
-            if lost is None:
+            dropped = {t.id: str(error).split(": ", 1)[1] for t in left if str(error).startswith(f"task {t.id!r}:")}
+            if not dropped:
                 raise
-            gone = _with_successors(lost.id, left)
-            reasons += [str(error), *(f"task {i!r}: comes after {lost.id!r}" for i in sorted(gone - {lost.id}))]
-            undone += [t.id for t in left if t.id in gone]
-            left = [t for t in left if t.id not in gone]
+        if dropped:
+            for task, why in dropped.items():
+                gone = _with_successors(task, left) & {t.id for t in left}
+                reasons += [f"task {task!r} can no longer be done: {why}"] if task in gone else []
+                reasons += [f"task {i!r} can no longer be done: it comes after {task!r}" for i in sorted(gone - {task})]
+                undone += [t.id for t in left if t.id in gone]
+                left = [t for t in left if t.id not in gone]
             continue
         return replace(
             after,
@@ -75,6 +82,30 @@ def assign_from_now(mission: Mission, scenario: Scenario, progress: Progress, *,
         reasons=(*reasons, *missing),
         layers=(),
     )
+
+
+def _rows(mission: Mission, vehicles: Sequence[Vehicle], left: Sequence[Task]) -> list[list[int]]:
+    """Return each vehicle's tasks of those that are left, by number, in the plan's order."""
+    number = {t.id: i for i, t in enumerate(left)}
+    planned = {r.vehicle: [number[w.task] for w in r.waypoints if w.task in number] for r in mission.routes}
+    return [planned.get(v.id, []) for v in vehicles]
+
+
+def _too_much(mission: Mission) -> list[str]:
+    """Return the tasks for which the energy or time of their vehicles does not suffice: the last on each route, one at the
+    least, less urgent ones first.
+    """
+    urgency = {t.id: t.priority for t in mission.tasks}
+    found = []
+    for vehicle, route in zip(mission.vehicles, mission.routes, strict=True):
+        if not shortfalls(vehicle, route):
+            continue
+        visits = [w for w in route.waypoints if w.task]
+        share = min(seconds_out(vehicle), 0.99 * route.duration) / route.duration
+        spare = max(1, len(visits) - int(share * len(visits)))
+        last = sorted(enumerate(visits), key=lambda v: (urgency[v[1].task or ""], -v[0]))[:spare]
+        found += [w.task for _, w in last if w.task]
+    return found
 
 
 def _habits(parameters: Mapping[str, Any]) -> dict[str, Any]:

@@ -61,8 +61,13 @@ def turn_times(vehicle: Vehicle, points: np.ndarray) -> np.ndarray:
     moving = np.hypot(*step.T) > 0
     both = moving[:-1] & moving[1:]
     angle[1:-1] = np.where(both, np.abs((np.diff(heading) + np.pi) % (2 * np.pi) - np.pi), 0.0)
+    return turn_seconds(vehicle, angle)
+
+
+def turn_seconds(vehicle: Vehicle, angle: np.ndarray) -> np.ndarray:
+    """Return the seconds lost in turns by `angle` radians from 0 to pi, as in `turn_times`."""
     if vehicle.turn_radius > 0:
-        return np.zeros(len(points))
+        return np.zeros(np.shape(angle))
     stop = vehicle.speed / vehicle.model.acceleration
     if vehicle.domain == "ground":
         return np.where(angle > 1e-3, stop + angle / vehicle.model.turn_rate, 0.0)

@@ -72,6 +72,31 @@ def generation(p: Problem, pop: Population, rounds: int) -> None:
 
 
 @njit(cache=True)
+def settle(p: Problem, pop: Population, seq: np.ndarray, length: np.ndarray, rounds: int) -> None:
+    """Put the tasks that rows lack into them, improve them, and begin the population with them instead of founders."""
+    k, n = p.out.shape
+    absent, count = np.empty(n, np.int64), 0
+    there = np.zeros(n, np.bool_)
+    for r in range(k):
+        there[seq[r, : length[r]]] = True
+    for task in range(n):
+        if not there[task]:
+            absent[count] = task
+            count += 1
+    start, done = np.empty(n), np.empty(k)
+    t = tables(p, seq, length)
+    if count and not recreate(p, t, seq, length, absent, count, np.zeros(k, np.bool_), SMOOTH[1], pop.rng, start, done):
+        return
+    scale = measure_alone(p, seq, length)[0]
+    if scale == np.inf:
+        return
+    heat = (WARM[0] * scale, WARM[1] * scale)
+    cost, total = ruin_recreate(p, seq, length, rounds, heat, (0.5 * SMOOTH[0], SMOOTH[1]), pop.rng)
+    _keep(pop, seq, length, cost, total)
+    pop.tally[1] = FOUNDERS
+
+
+@njit(cache=True)
 def measure_alone(p: Problem, seq: np.ndarray, length: np.ndarray) -> tuple[float, float]:
     """Return the objective with penalties and the total tour time of one solution."""
     k, n = p.out.shape

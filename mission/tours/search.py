@@ -1,14 +1,14 @@
 """The search as a whole: generations until a budget of iterations, a deadline, a proof or Ctrl-C ends it."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from quarterdeck.geo.deadline import cause, time_is_up
 from quarterdeck.mission.tours.bound import lower_bound
-from quarterdeck.mission.tours.genetic import generation, population
+from quarterdeck.mission.tours.genetic import generation, population, settle
 from quarterdeck.mission.tours.problem import Problem
 from quarterdeck.mission.tours.rng import stream
 from quarterdeck.mission.tours.schedule import schedule
@@ -46,6 +46,7 @@ def search(
     *,
     iterations: int | None = ITERATIONS,
     time_limit: float | None = None,
+    first: Sequence[Sequence[int]] | None = None,
     seed: int = 0,
     clock: Callable[[], float] = time.monotonic,
     progress: Callable[[int, float, float], None] | None = None,
@@ -53,13 +54,19 @@ def search(
     """Return the best solution found; the same for the same problem, seed and iterations, unless `time_limit` cuts it.
 
     `time_limit` is seconds of `clock`; `progress` is told iteration, best objective and bound after each. Ctrl-C ends the
-    search with the best so far. Every task must have a robot that can do it.
+    search with the best so far. Every task must have a robot that can do it. `first` are rows to begin with, where some are
+    known, such as what is left of a plan: tasks that are in none are put in, and nothing is sought from scratch.
     """
     begun = clock()
     n = p.service.size
     bound = lower_bound(p)
     pop = population(p, stream(seed))
     rounds = max(LEAST_ROUNDS, min(ROUNDS * n, COUPLED // n**2) if p.coupled else ROUNDS * n)
+    if first is not None and n:
+        seq, length = np.zeros(p.out.shape, np.int64), np.array([len(row) for row in first], np.int64)
+        for r, row in enumerate(first):
+            seq[r, : len(row)] = row
+        settle(p, pop, seq, length, rounds)
     done, stopped = 0, "iterations"
     best, since = np.inf, 0
     try:
