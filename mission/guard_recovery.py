@@ -24,7 +24,9 @@ from quarterdeck.mission.timing import shortfalls
 EFFORT = 0.1  # of the search for a whole plan: robots are waiting
 
 
-def guards_from_now(mission: Mission, scenario: Scenario, served: frozenset[str], *, seed: int = 0) -> Mission:
+def guards_from_now(
+    mission: Mission, scenario: Scenario, served: frozenset[str], *, effort: float = EFFORT, seed: int = 0
+) -> Mission:
     """Return the mission that sees what `mission`, a guards plan, has not confirmed to have seen.
 
     `scenario` is the world as it is now: the site, and the vehicles that work, each with its start where it is, its end
@@ -47,7 +49,7 @@ def guards_from_now(mission: Mission, scenario: Scenario, served: frozenset[str]
     owners += [None] * (len(guards) - len(owners))
     net = network(space.reach, guards, team.starts)
     start = Tours(guards, net, _shared(net, owners, mission, team), (), (), np.zeros(len(ranges)), 0.0)
-    tours = _affordable(space, shorter_tours(space, start, team, effort=EFFORT, seed=seed), team)
+    tours = _affordable(space, shorter_tours(space, start, team, effort=effort, seed=seed), team)
     after = guards_mission(scenario, space, mesh, tours, team, ())
     lost = after.figures["certificate"]["uncovered"]
     reasons = [f"{lost:.6g} m2 can no longer be seen" + _why(hidden.area, lonely.area, lost)] if lost > 0 else []
