@@ -80,8 +80,8 @@ def speeds() -> list[dict[str, Any]]:
             lambda: plan_guards(scenario_on(room, 5), range=20.0),
             "r3",
         ),
-        ("guards, 100 corners, range 20 m, 5 robots", 0.02, lambda: plan_guards(scenario_on(halls, 5), range=20.0), "r3"),
-        ("guards, 100 corners, range 10 m, 5 robots", 0.02, lambda: plan_guards(scenario_on(halls, 5), range=10.0), "r3"),
+        ("guards, 100 corners, range 20 m, 5 robots", 0.02, lambda: plan_guards(scenario_on(corners, 5), range=20.0), "r3"),
+        ("guards, 100 corners, range 10 m, 5 robots", 0.02, lambda: plan_guards(scenario_on(corners, 5), range=10.0), "r3"),
     ]
     return [_speed(name, target, make(), lost) for name, target, make, lost in cases]
 
