@@ -67,7 +67,9 @@ def run_case(case: Any) -> tuple[Run, Watched]:
 def judge(case: Any, run: Run, watched: Watched) -> list[str]:
     """Return what is wrong with a run, a line each."""
     mission, report = case.mission, run.report
-    lost = {f.vehicle for f in case.faults if f.kind == "lost"}
+    lost = {f.vehicle for f in case.faults if f.kind == "lost"} | {
+        v.id for v in report.vehicles if v.aground and not v.hits
+    }
     silent = {f.vehicle for f in case.faults if f.kind == "comms" and f.end == float("inf")}
     last = watched.plans[-1][1] if watched.plans else mission
     wrong = []
@@ -85,12 +87,12 @@ def judge(case: Any, run: Run, watched: Watched) -> list[str]:
         if v.energy > vehicle.battery:
             wrong.append(f"{v.id} used {v.energy:.1f} Wh of {vehicle.battery:.1f} Wh")
     if lost | silent != {v.id for v in mission.vehicles} and not last.reasons:
-        wrong += _undone(mission, run, watched, last)
+        wrong += _undone(mission, run, watched, last, any(f.kind == "comms" for f in case.faults))
     return wrong
 
 
-def _undone(mission: Mission, run: Run, watched: Watched, last: Mission) -> list[str]:
-    """Return what was planned, not done and not told of."""
+def _undone(mission: Mission, run: Run, watched: Watched, last: Mission, unheard: bool) -> list[str]:
+    """Return what was planned, not done and not told of; where somebody was `unheard` a task may be done twice."""
     if mission.method == "guards":
         before = seen_fraction(mission, [shapely.LineString(r.xyz[:, :2]) for r in mission.routes if len(r.waypoints) > 1])
         after = seen_fraction(mission, whole_tracks(run.trace, 0.02))
@@ -105,9 +107,9 @@ def _undone(mission: Mission, run: Run, watched: Watched, last: Mission) -> list
             for a in t.after
             if t.id in place and place.get(a.task, len(place)) > place[t.id]
         ]
-        wrong = [f"served twice: {', '.join(twice)}"] if twice else []
-        wrong += [f"not served: {', '.join(undone)}"] if undone else []
-        return wrong + ([f"served {', '.join(early)}"] if early else [])
+        wrong = [f"not served: {', '.join(undone)}"] if undone else []
+        wrong += [f"served twice: {', '.join(twice)}"] if twice and not unheard else []
+        return wrong + ([f"served {', '.join(early)}"] if early and not unheard else [])
     spacing = float(mission.spacing or 0.0)
     surveying = run.trace.kind == LEGS.index("survey")
     driven = np.column_stack([run.trace.x[surveying], run.trace.y[surveying]])

@@ -140,7 +140,7 @@ def _berths(
 
 def _tasks(room: MultiPolygon, robots: int, across: float, rng: np.random.Generator) -> tuple[Task, ...]:
     """Return tasks anywhere in `room`, some after others; `across` is the seconds from side to side."""
-    count = int(rng.integers(robots, 4 * robots + 2))
+    count = int(rng.integers(robots, min(4 * robots, 16) + 2))
     tasks: list[Task] = []
     while len(tasks) < count:
         place = rng.uniform(room.bounds[:2], room.bounds[2:])
@@ -166,7 +166,7 @@ def _planned(kind: str, scenario: Scenario, rng: np.random.Generator) -> Mission
     if kind == "guards":
         return plan_guards(scenario, range=float(scenario.spacing or 0.0) * rng.uniform(1.5, 3.0), seed=seed)
     if kind == "tasks":
-        return assign(scenario, iterations=100, seed=seed)
+        return assign(scenario, iterations=30, seed=seed)
     if kind == "lines":
         return plan_lines(scenario, seed=seed)
     return cover(scenario, edge=str(rng.choice(["whole", "cells", "lap"])), seed=seed)  # type: ignore[arg-type]

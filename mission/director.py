@@ -6,6 +6,7 @@ commands. So waiting, faults, triage and recovery have one door, and are the sam
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from math import inf
 from typing import Any, Protocol
 
 from quarterdeck.mission.mission import Mission, Waypoint
@@ -56,13 +57,19 @@ class Command:
 class Director(Protocol):
     """(time, states by vehicle id, events since the last call, memory) -> (commands by vehicle id, memory).
 
-    A vehicle without a command carries on with its last. `memory` is None at the first call.
+    A vehicle without a command carries on with its last. `memory` is None at the first call. A memory with an attribute
+    `wake`, seconds, asks to be called then though nothing happens; the run is not over before.
     """
 
     def __call__(
         self, time: float, states: Mapping[str, State], events: tuple[Event, ...], memory: Any
     ) -> tuple[dict[str, Command], Any]:
         """Decide."""
+
+
+def wake_time(memory: Any) -> float:
+    """Return the seconds at which a director asks to be called again; infinity where it does not."""
+    return float(getattr(memory, "wake", inf))
 
 
 def fixed(mission: Mission) -> Director:

@@ -52,7 +52,9 @@ def inspection(mission: Mission) -> Director:
     ) -> tuple[dict[str, Command], Memory]:
         known = memory if memory is not None else Memory(dict.fromkeys(stages, 0))
         done = known.done | {e.subject for e in events if e.kind == "served" and e.subject in before}
-        lost = known.lost | {e.vehicle for e in events if e.kind == "lost"} | {v for v in stages if not states[v].alive}
+        heard = {e.vehicle for e in events if e.kind == "returned"}
+        lost = (known.lost | {e.vehicle for e in events if e.kind == "lost"}) - heard
+        away = lost | {v for v in stages if not states[v].alive}
         sent, waiting = dict(known.sent), set(known.waiting)
         abandoned, stranded = dict(known.abandoned), set(known.stranded)
         for e in events:
@@ -67,14 +69,14 @@ def inspection(mission: Mission) -> Director:
         abandoned = _with_successors(abandoned, before)
         commands: dict[str, Command] = {}
         for vehicle in stages:
-            if (memory is None or states[vehicle].idle) and vehicle not in lost:
+            if (memory is None or states[vehicle].idle) and vehicle not in away:
                 way, sent[vehicle], wait = _onward(vehicle, sent[vehicle], vehicle in waiting, done, abandoned, time)
                 (waiting.add if wait else waiting.discard)(vehicle)
                 if way or not states[vehicle].idle:  # a plan that begins in mid-course ends what was under way
                     commands[vehicle] = Command(way)
         known = Memory(sent, frozenset(waiting), done, lost, abandoned, frozenset(stranded))
-        if not commands and waiting - lost and all(states[v].idle for v in stages if v not in lost):
-            return _give_up(known, states)
+        if not commands and waiting - away and all(states[v].idle for v in stages if v not in lost):
+            return _give_up(known, states, away)
         return commands, known
 
     def _onward(
@@ -98,10 +100,10 @@ def inspection(mission: Mission) -> Director:
             done |= {stage.task}
         return way, len(stages[vehicle]), False
 
-    def _give_up(memory: Memory, states: Mapping[str, State]) -> tuple[dict[str, Command], Memory]:
+    def _give_up(memory: Memory, states: Mapping[str, State], away: frozenset[str]) -> tuple[dict[str, Command], Memory]:
         """Send home, by the way it came, whoever waits for what nobody will do."""
         commands, sent, abandoned = {}, dict(memory.sent), dict(memory.abandoned)
-        for vehicle in sorted(memory.waiting - memory.lost):
+        for vehicle in sorted(memory.waiting - away):
             own, here = stages[vehicle], sent[vehicle]
             for task in [s.task for s in own[here:] if s.task is not None]:
                 lacking = ", ".join(repr(t) for t in sorted(before[task] - memory.done))

@@ -1,9 +1,14 @@
 """The director that recovers: it follows the plan until a vehicle is lost or comes back, or finds no way to where it
 should be, and then replans for all.
+
+It knows what was last heard: of a vehicle that is silent it knows neither where it is nor whether it works, nor can it
+tell it of a new plan. Silent for longer than the delay, it is given up, and stays in the others' way where it was last.
+When it is heard again, what it has done meanwhile counts, and it takes a part of what is left.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -16,42 +21,49 @@ from quarterdeck.mission.changes import Changes
 from quarterdeck.mission.director import Command, Director, Event, State
 from quarterdeck.mission.inspection import Memory as Inspected
 from quarterdeck.mission.inspection import default_director
-from quarterdeck.mission.mission import Mission
+from quarterdeck.mission.mission import Mission, Route
 from quarterdeck.mission.progress import Progress, surveyed
 from quarterdeck.mission.replan import replan
 from quarterdeck.mission.triage.plan import METHOD
 
 FOUND = "found-"  # how the ids begin of what robots have found
-ROOM = 3.0  # lengths kept from a vehicle that stands still, as vehicles keep from each other
+BERTH = 4.0  # lengths from its end: so near, whoever launches and recovers the vehicles clears the way
+COASTS = 2.0  # s at its speed that a vehicle may have gone on from where it was heard last
+Tell = Callable[[float, Mission], None]
 
 
 @dataclass(frozen=True, slots=True)
 class _Memory:
     """What is remembered: the plan followed and since when, what was done before it, who is missed and until when to wait.
 
-    `used` is each vehicle's watt-hours at `since`; `tracks` and `served` are all that was done before that plan. `barred`
-    are vehicles and the tasks to which they found no way, `undone` what earlier plans told could not be done.
+    `following` is the route that each vehicle was last told and heard; `used` each vehicle's watt-hours at `since`;
+    `tracks` and `served` are all that was done before that plan; `given_up` who is held for lost; `wake` when the next
+    silence has lasted too long. `barred` are vehicles and the tasks to which they found no way, `undone` what earlier plans
+    told could not be done.
     """
 
     mission: Mission
     director: Director
+    following: Mapping[str, Route]
     since: float = 0.0
     inner: Any = None
     tracks: tuple[np.ndarray, ...] = ()
     served: frozenset[str] = frozenset()
     used: Mapping[str, float] | None = None
-    missed: tuple[tuple[float, str], ...] = ()
+    missed: Mapping[str, float] | None = None
+    given_up: frozenset[str] = frozenset()
+    wake: float = inf
     barred: frozenset[tuple[str, str]] = frozenset()
     undone: tuple[str, ...] = ()
 
 
-def recovering(mission: Mission, *, delay: float = 0.0, tell: Callable[[float, Mission], None] | None = None) -> Director:
+def recovering(mission: Mission, *, delay: float = 0.0, tell: Tell | None = None) -> Director:
     """Return the director that replans (`mission.replan.replan`) `delay` seconds after a loss is heard of.
 
     Who is heard of again within the delay was a false alarm; who comes back later takes a part of what is left. Where a
     robot finds no way to a task, what it found becomes an obstacle of the new plan, and the task goes to who can reach it.
-    `tell` gets the time and each new plan. A loss that nobody is left to recover from changes nothing. A triage team sees
-    to its losses itself.
+    `tell` gets the time and each new plan. A loss that nobody is left to recover from changes nothing until somebody comes
+    back. A triage team sees to its losses itself.
     """
     if mission.method == METHOD:
         return default_director(mission)
@@ -59,23 +71,29 @@ def recovering(mission: Mission, *, delay: float = 0.0, tell: Callable[[float, M
     def direct(
         time: float, states: Mapping[str, State], events: tuple[Event, ...], memory: Any
     ) -> tuple[dict[str, Command], Any]:
-        now: _Memory = memory or _Memory(mission, default_director(mission))
-        planned = {v.id for v in now.mission.vehicles}
+        now: _Memory = memory or _Memory(mission, default_director(mission), {r.vehicle: r for r in mission.routes})
         heard = {e.vehicle for e in events if e.kind == "returned"}
-        missed = tuple(m for m in now.missed if m[1] not in heard)
-        missed += tuple((time + delay, e.vehicle) for e in events if e.kind == "lost" and e.vehicle in planned)
-        served = now.served | {e.subject for e in events if e.kind == "served"}
-        now = replace(now, missed=missed, served=served)
-        lost = frozenset(v for due, v in missed if due <= time and v not in heard)
-        back = [v for v in mission.vehicles if v.id in heard and v.id not in planned]
+        missed = {v: due for v, due in (now.missed or {}).items() if v not in heard}
+        missed |= {e.vehicle: time + delay for e in events if e.kind == "lost" and e.vehicle not in now.given_up | heard}
+        due = frozenset(v for v, when in missed.items() if when <= time)
+        back = now.given_up & heard
         barred = [e for e in events if e.kind == "unreachable" and (e.vehicle, e.subject) not in now.barred and e.subject]
-        now = replace(now, barred=now.barred | {(e.vehicle, e.subject) for e in barred})
-        if lost or back or barred:
-            found = _found([e.data["found"] for e in barred])
-            after = _replanned(now, time, states, lost, [(v.id, mission) for v in back], found, tell)
+        now = replace(
+            now,
+            missed={v: when for v, when in missed.items() if v not in due},
+            given_up=(now.given_up | due) - back,
+            served=now.served | {e.subject for e in events if e.kind == "served"},
+            barred=now.barred | {(e.vehicle, e.subject) for e in barred},
+        )
+        plan = {r.vehicle: r for r in now.mission.routes}
+        stale = {v for v in heard & plan.keys() if now.following.get(v) is not plan[v]}  # replanned while it was silent
+        if due & plan.keys() or back or stale or barred:
+            after = _replanned(now, mission, time, states, _found([e.data["found"] for e in barred]), tell)
             if after.mission is not now.mission:
                 events = tuple(e for e in events if e not in barred)
             now = after
+        now = replace(now, wake=min((now.missed or {}).values(), default=inf))
+        events = tuple(e for e in events if e.kind not in ("lost", "returned"))  # whoever waits for the silent waits on
         commands, inner = now.director(time - now.since, states, events, now.inner)
         return commands, replace(now, inner=inner)
 
@@ -84,20 +102,22 @@ def recovering(mission: Mission, *, delay: float = 0.0, tell: Callable[[float, M
 
 def _replanned(
     now: _Memory,
+    first: Mission,
     time: float,
     states: Mapping[str, State],
-    lost: frozenset[str],
-    back: list[tuple[str, Mission]],
     found: tuple[Obstacle, ...],
-    tell: Callable[[float, Mission], None] | None,
+    tell: Tell | None,
 ) -> _Memory:
-    """Return the memory with a new plan, or, where nobody is left, the old one."""
+    """Return the memory with a new plan for all who are not given up, or, where nobody is left, the old one."""
+    planned = {v.id for v in now.mission.vehicles}
+    working = {v.id for v in first.vehicles} - now.given_up
+    if not working:
+        return now
     used = now.used or {}
     tracks = list(now.tracks)
-    for route in now.mission.routes:
-        state = states[route.vehicle]
-        if now.mission.spacing is not None:
-            tracks += surveyed(route, min(state.reached + 1, len(route.waypoints)), (state.x, state.y, state.z))
+    for name, route in now.following.items() if now.mission.spacing is not None else ():
+        state = states[name]
+        tracks += surveyed(route, min(state.reached + 1, len(route.waypoints)), (state.x, state.y, state.z))
     progress = Progress(
         time=time - now.since,
         positions={v: (s.x, s.y, s.z) for v, s in states.items()},
@@ -105,29 +125,33 @@ def _replanned(
         tracks=tuple(tracks),
         served=now.served,
     )
-    joined = tuple(
-        replace(first.vehicle(v), start=(states[v].x, states[v].y), end=first.vehicle(v).home) for v, first in back
+    wrecks = {w.id: w for v in sorted(now.given_up) if (w := _wreck(first, v, working, states)) is not None}
+    known = {o.id for o in now.mission.site.obstacles}
+    again = {_wreck_id(v) for v in working} | ({o for o in known if o.startswith(FOUND)} if found else set())
+    changes = Changes(
+        lost=frozenset(planned & now.given_up),
+        back=dict.fromkeys(sorted(working - planned)),
+        obstacles=(*(w for w in wrecks.values() if w.id not in known), *found),
+        gone=frozenset(known & again),
     )
-    kept = replace(now, missed=tuple(m for m in now.missed if m[1] not in lost))
     try:
-        gone = frozenset(o.id for o in now.mission.site.obstacles if o.id.startswith(FOUND)) if found else frozenset()
-        wrecks = tuple(w for v in sorted(lost) if (w := _wreck(now.mission, v, states)) is not None)
-        after = replan(now.mission, progress, Changes(lost=lost, joined=joined, obstacles=(*wrecks, *found), gone=gone))
-    except InputError:  # nobody is left
-        return kept
+        after = replan(now.mission, progress, changes)
+    except InputError as error:
+        return replace(now, undone=(*now.undone, f"no new plan at {time:.0f} s: {error}"))
     if tell:
         tell(time, after)
+    told = {r.vehicle: r for r in after.routes if states[r.vehicle].alive}
+    left = (*now.undone, *undone(now.inner), *(r for r in after.reasons if r.startswith("task ")))
     return replace(
-        kept,
+        now,
         mission=after,
         director=default_director(after),
+        following={**now.following, **told},
         since=time,
         inner=None,
         tracks=tuple(tracks),
         used={v: s.energy_used for v, s in states.items()},
-        undone=tuple(
-            dict.fromkeys((*kept.undone, *undone(kept.inner), *(r for r in after.reasons if r.startswith("task "))))
-        ),
+        undone=tuple(dict.fromkeys(left)),
     )
 
 
@@ -147,15 +171,20 @@ def _found(found: list[MultiPolygon]) -> tuple[Obstacle, ...]:
     return tuple(Obstacle(f"{FOUND}{n}", part, frozenset({"ground"})) for n, part in enumerate(parts, start=1))
 
 
-def _wreck(mission: Mission, lost: str, states: Mapping[str, State]) -> Obstacle | None:
-    """Return the lost vehicle as an obstacle where it was last, if it stands in nobody's start, way home or air."""
-    vehicle, state = mission.vehicle(lost), states[lost]
-    if vehicle.domain == "aerial":
+def _wreck_id(vehicle: str) -> str:
+    return f"wreck of {vehicle}"
+
+
+def _wreck(first: Mission, lost: str, working: set[str], states: Mapping[str, State]) -> Obstacle | None:
+    """Return a vehicle that is given up as an obstacle to its kind: its hull, and as far as it went on unheard.
+
+    None where it fell from the air, or lies at somebody's berth, where it is seen to.
+    """
+    vehicle, state = first.vehicle(lost), states[lost]
+    here, length = Point(state.x, state.y), vehicle.model.length
+    if vehicle.domain == "aerial" or any(here.distance(Point(v.home)) < BERTH * length for v in first.vehicles):
         return None
-    wreck = Point(state.x, state.y).buffer(ROOM * vehicle.model.length)
-    for other in mission.vehicles:
-        here = states[other.id]
-        near = min(wreck.distance(Point(here.x, here.y)), wreck.distance(Point(other.home)))
-        if other.id != lost and near <= other.clearance:
-            return None
-    return Obstacle(f"wreck of {lost}", wreck, frozenset({vehicle.domain}))
+    hull = 0.5 * float(np.hypot(length, vehicle.model.width))
+    free = min((here.distance(Point(states[v].x, states[v].y)) for v in working), default=inf)
+    radius = min(hull + COASTS * vehicle.speed, 0.9 * free)
+    return Obstacle(_wreck_id(lost), here.buffer(radius, quad_segs=4), frozenset({vehicle.domain})) if radius > 0 else None

@@ -85,7 +85,7 @@ class Squad(ABC):
     @property
     def shifted(self) -> np.ndarray:
         """(k,) metres of `aside` that each has already moved: it follows what it is told with a lag."""
-        return np.clip(-self.tracks["cross"], 0.0, self.aside)
+        return np.clip(-self.tracks["cross"], np.minimum(self.aside, 0.0), np.maximum(self.aside, 0.0))
 
     @abstractmethod
     def figures(self, vehicle: Vehicle) -> np.ndarray:

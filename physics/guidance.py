@@ -60,7 +60,7 @@ def guide_vessels(
                 wanted = min(wanted, max(np.sqrt(2 * 0.5 * lim.accel * max(remaining - ARRIVED / 2, 0.0)), 0.2))
             _step_aside(t, lim, step)
             ahead = max(2.5 * lim.length, 1.5 * lim.speed)
-            t.cross, t.turning = cross, along < lim.zone or remaining < lim.zone or t.aside > 0
+            t.cross, t.turning = cross, along < lim.zone or remaining < lim.zone or t.aside != 0
             cross += t.aside
             kappa = 0.05 * lim.speed
             if abs(cross) < 2 * ahead and wanted > 0.1:
@@ -125,7 +125,7 @@ def guide_rovers(
             continue
         tx, ty, length, along, cross = _leg(t, table, x, y)
         _step_aside(t, lim, step)
-        t.cross, t.turning = cross, along < lim.zone or length - along < lim.zone or t.aside > 0
+        t.cross, t.turning = cross, along < lim.zone or length - along < lim.zone or t.aside != 0
         cross += t.aside
         if t.mode == ROTATE:
             error = _wrap(np.arctan2(ty, tx) - psi)
@@ -202,7 +202,7 @@ def guide_multirotors(
             px, py, pz = position[i, 0] - a.x, position[i, 1] - a.y, position[i, 2] - a.z
             along = (px * dx + py * dy + pz * dz) / length
             t.cross = np.sqrt(max(px * px + py * py + pz * pz - along * along, 0.0))
-            t.turning = along < lim.zone or length - along < lim.zone or t.aside > 0
+            t.turning = along < lim.zone or length - along < lim.zone or t.aside != 0
         else:
             reference[i, 0], reference[i, 1], reference[i, 2] = b.x, b.y, b.z
             reference[i, 3] = reference[i, 4] = reference[i, 5] = 0.0

@@ -10,7 +10,7 @@ from shapely import LineString, MultiPolygon
 
 from quarterdeck.geo.scenario import Site
 from quarterdeck.geo.terrain import Terrain
-from quarterdeck.mission.director import Command, Director, Event, State
+from quarterdeck.mission.director import Command, Director, Event, State, wake_time
 from quarterdeck.mission.mission import Mission, Waypoint
 from quarterdeck.mission.triage.plan import METHOD as TRIAGE
 from quarterdeck.physics.faults import Fault, active, next_change
@@ -20,7 +20,7 @@ from quarterdeck.physics.paths import ROTATE, SAIL
 from quarterdeck.physics.rerouting import Rerouting
 from quarterdeck.physics.rover import climb_parameters
 from quarterdeck.physics.sensing import Legs, Senses, Sensing
-from quarterdeck.physics.separation import give_way, stop_for_others
+from quarterdeck.physics.separation import give_way, stop_short
 from quarterdeck.physics.sightings import look_out
 from quarterdeck.physics.terrain import stand, steepness
 from quarterdeck.physics.trace import TraceBuilder
@@ -28,6 +28,7 @@ from quarterdeck.physics.wind import MEMORY, step_gusts
 from quarterdeck.physics.world import GAP, HEIGHT, INCONSISTENT, World
 
 DECIDE = 1.0  # s between calls of the director
+WARY = 0.2  # s between looks out for others where some are near
 HARBOUR = 4.0  # lengths: so near its start or end a vehicle is being launched or recovered
 KEEP = 3.0  # lengths kept from other vehicles
 CRASH = 4.0  # m/s: a multirotor that meets the ground faster is out of the mission
@@ -65,7 +66,9 @@ class Running:
         self.home = np.array([v.home for v in vehicles], float).reshape(-1, 2)
         self.start = self.position[:, :2].copy()
         self.harbour = np.array([HARBOUR * v.model.length for v in vehicles])
-        self.keep = np.array([KEEP * v.model.length for v in vehicles])
+        self.length = np.array([v.model.length for v in vehicles])
+        self.keep = KEEP * self.length
+        self.wary = False  # somebody is so near to another that a second is long
         if self.mission.method == TRIAGE:  # small robots that meet on purpose
             self.keep *= 2.0 / KEEP
         self.brakes = np.array([v.model.acceleration for v in vehicles])
@@ -84,7 +87,7 @@ class Running:
         self.ids = [v.id for v in vehicles]
         self.change, self.suffering = -1.0, active((), self.ids, 0.0)
         self.aerial = np.array([v.domain == "aerial" for v in vehicles])
-        self.lost = np.zeros(self.count, bool)
+        self.lost, self.given_up = np.zeros(self.count, bool), np.zeros(self.count, bool)  # given_up: the director knows
         self.events: list[Event] = []  # not yet told to the director
         self.heard: dict[str, State] = {}
         self.undelivered: dict[str, Command] = {}
@@ -118,6 +121,8 @@ class Running:
         step = self.world.step
         if self.time >= self.change:
             self._befall()
+        if self.wary and round(self.time / step) % max(1, round(WARY / step)) == 0:
+            self._keep_clear()
         wind = self._wind(step)
         for squad in self.squads:
             squad.guide(self.time, step)
@@ -155,6 +160,8 @@ class Running:
             self._befall()
         reached = self._reached()
         self.events += self._serve(reached)
+        self.events += [Event("lost", self.ids[i]) for i in np.flatnonzero(self.aground & ~self.given_up & ~self.lost)]
+        self.given_up |= self.aground
         mute = dict(zip(self.ids, self.suffering["comms"].tolist(), strict=True))
         if self.lookout is not None:  # each decides for itself: what passes between them is the director's business
             mute = dict.fromkeys(self.ids, False)
@@ -177,8 +184,9 @@ class Running:
             self.senses.note()
             if self.router is not None:
                 self._reroute(self.senses, self.router, fresh)
-        idle = bool((self._gather("idle") & ~self.lost | self.aground | self.lost & ~self.aerial).all())
-        self.done = idle and all(mute[e.vehicle] for e in self.events)
+        over = bool((self._gather("idle") & ~self.lost | self.aground | self.lost & ~self.aerial).all())
+        told = all(mute[e.vehicle] for e in self.events) and not (self.aground & ~self.given_up).any()
+        self.done = over and told and wake_time(self.memory) == np.inf
 
     def record(self, builder: TraceBuilder) -> None:
         """Add a sample to the trace."""
@@ -271,11 +279,11 @@ class Running:
         return np.where(believed != 0, out, 0.0)
 
     def _states(self, reached: np.ndarray, mute: Mapping[str, bool]) -> dict[str, State]:
-        """Return what is known of each vehicle: of a mute one what was last heard, and that it is not heard."""
+        """Return what is known of each vehicle: of a mute or lost one what was last heard, and that it is not heard."""
         idle, energy = self._gather("idle"), self._gather("energy")
         alive = ~self.aground & ~self.lost
         for i, id in enumerate(self.ids):  # noqa: A001
-            if mute[id] and id in self.heard:
+            if (mute[id] or not alive[i]) and id in self.heard:
                 self.heard[id] = replace(self.heard[id], alive=False)
             else:
                 x, y, z = self.position[i].tolist()
@@ -378,24 +386,38 @@ class Running:
             squad.active[:] = ~(self.moored | self.aground)[squad.index]
 
     def _keep_clear(self) -> None:
-        """Have vehicles give way to one another; one that has no room to go aside stays on its path."""
-        slow, want, aside = np.empty(self.count), np.empty(self.count), self._gather("aside")
-        course = self._gather("course")
+        """Have vehicles give way to one another; one that has no room to go aside stays on its path.
+
+        Before what lies still on its path it stops, if it can pass on neither side.
+        """
+        slow, want, instead = (np.empty(self.count) for _ in range(3))
+        course, aside, rest = self._gather("course"), self._gather("aside"), self._gather("rest")
         speed = np.hypot(self.velocity[:, 0], self.velocity[:, 1])
         pace = np.where(self._gather("idle"), 0.0, self._gather("pace"))
-        shifted, present = self._gather("shifted"), ~self.moored & ~self.aground
-        give_way(self.position, course, speed, pace, shifted, self.keep, present, slow, want)
-        if self.lookout is not None:
-            stop_for_others(self.position, course, speed, self.keep / 3, self.brakes, present, slow)
-        rest = self._gather("rest")
-        for i in np.flatnonzero(want > aside):
-            ahead = self.position[i, :2] + course[i] * min(speed[i] * 5.0, rest[i])
-            side = ahead + (want[i] - aside[i]) * np.array([course[i, 1], -course[i, 0]])
-            if not self.room[i].contains(LineString([self.position[i, :2], ahead, side])):
+        present = ~self.moored & ~self.aground
+        give_way(self.position, course, speed, pace, self._gather("shifted"), self.keep, present, slow, want, instead)
+        for i in map(int, np.flatnonzero((want != 0) & (want != aside))):
+            reach = course[i] * min(speed[i] * 5.0, rest[i])
+            if self._has_room(i, reach, course[i], want[i] - aside[i]):
+                continue
+            if np.isnan(instead[i]):
                 want[i] = aside[i]
+            elif self._has_room(i, reach, course[i], instead[i] - aside[i]):
+                want[i] = instead[i]
+            else:
+                want[i], slow[i] = aside[i], 0.0
+        self.wary = stop_short(
+            self.position, self.velocity, course, pace, want - aside, self.length, self.brakes, present, slow
+        )
         self.slow = slow
         for squad in self.squads:
             squad.tracks["slow"], squad.tracks["want"] = slow[squad.index], want[squad.index]
+
+    def _has_room(self, i: int, ahead: np.ndarray, course: np.ndarray, starboard: float) -> bool:
+        """Return whether vehicle `i` can go `ahead`, (2,) metres, and as many further to starboard."""
+        there = self.position[i, :2] + ahead
+        side = there + starboard * np.array([course[1], -course[0]])
+        return self.room[i].contains(LineString([self.position[i, :2], there, side]))
 
     def _serve(self, reached: np.ndarray) -> tuple[Event, ...]:
         """Return an event for each task served since the last call."""

@@ -9,7 +9,8 @@ import numpy as np
 from numba import njit
 
 HORIZON = 20.0  # s
-MARGIN = 0.2  # m between two hulls
+REACH = 0.65  # lengths from its middle that a hull may reach, whichever way it points
+BERTH = 0.45  # of the distance kept: how near one may pass what lies still; less than routes keep from wrecks
 
 
 @njit(cache=True)
@@ -23,8 +24,12 @@ def give_way(
     present: np.ndarray,
     slow: np.ndarray,
     want: np.ndarray,
+    instead: np.ndarray,
 ) -> None:
     """Set `slow` (k,), the speed allowed, m/s, and `want` (k,), how far to starboard of its path each is to go, metres.
+
+    `instead` (k,) is where to go if there is no room for that, to port of what lies still or to starboard of it; NaN where
+    going to starboard is the rule.
 
     `position` (k, 3); `course` (k, 2) the direction of the leg, zeros for one that lies still; `speed` (k,) over ground and
     `pace` (k,) as planned, m/s, 0 for one that is done; `aside` (k,) how far off its leg each has already gone; `keep` (k,)
@@ -32,7 +37,7 @@ def give_way(
     vehicle stays aside until the other is past.
     """
     for i in range(len(position)):
-        slow[i], want[i] = np.inf, 0.0
+        slow[i], want[i], instead[i] = np.inf, 0.0, np.nan
         if not present[i]:
             continue
         going = course[i, 0] != 0.0 or course[i, 1] != 0.0
@@ -47,18 +52,25 @@ def give_way(
                 continue
             if abs(position[j, 2] - position[i, 2]) > apart:
                 continue
+            still = course[j, 0] == 0.0 and course[j, 1] == 0.0 and speed[j] < 0.3
+            if still and going:  # pass it by, on the side where that is the smaller detour
+                along = px * course[i, 0] + py * course[i, 1]
+                aft = px * course[i, 1] - py * course[i, 0] + aside[i]  # to starboard of the leg
+                berth = BERTH * apart
+                passing = -berth if aside[i] != 0.0 else 0.0  # aside until it is past
+                if passing < along < berth + speed[i] * HORIZON and abs(aft) < berth:
+                    one, other = aft + 1.1 * berth, aft - 1.1 * berth
+                    want[i], instead[i] = (one, other) if one < -other else (other, one)
+                    if along < 1.5 * berth and abs(aft - aside[i]) < 0.7 * berth:  # not yet aside
+                        slow[i] = 0.0
+                continue
             if speed[i] < 0.2 * pace[i]:  # about to start: those before it in the list go first
                 if np.hypot(px, py) < apart and i > j and pace[j] > 0.0:
                     slow[i] = 0.0
-                ahead, beside = px * course[i, 0] + py * course[i, 1], px * course[i, 1] - py * course[i, 0]
-                stays = course[j, 0] == 0.0 and course[j, 1] == 0.0
-                if going and stays and 0.0 < ahead < 2 * apart and abs(beside + aside[i]) < apart:
-                    want[i] = 1.3 * apart
                 continue
             if not going:
                 continue
-            gap, turning = np.hypot(px, py), speed[j] < 0.1 * pace[j] and i < j
-            beside = abs(px * course[i, 1] - py * course[i, 0])
+            turning = speed[j] < 0.1 * pace[j] and i < j
             # Both as they would be on their legs.
             px += aside[i] * course[i, 1] - aside[j] * course[j, 1]
             py += aside[j] * course[j, 0] - aside[i] * course[i, 0]
@@ -71,11 +83,8 @@ def give_way(
             bearing = _wrap(np.arctan2(py, px) - angle)
             if abs(bearing) > 1.96 and np.hypot(px, py) > 0.5 * apart:  # abaft the beam: the other's business
                 continue
-            still = ((vx == 0.0 and vy == 0.0) or turning) and speed[j] < 0.3
-            if still:  # pass it by, slowly until there is room
+            if turning and speed[j] < 0.3:  # pass it by
                 want[i] = 1.3 * apart
-                if beside < 0.8 * apart and course[j, 0] == 0.0 and course[j, 1] == 0.0:
-                    slow[i] = min(slow[i], max(0.5 * (gap - 0.8 * apart), 0.2))
                 continue
             meeting = abs(_wrap(np.arctan2(vy, vx) - angle))
             if meeting > 2.62 and abs(bearing) < 1.6:  # head-on: both to starboard
@@ -90,36 +99,63 @@ def give_way(
 
 
 @njit(cache=True)
-def stop_for_others(
+def stop_short(
     position: np.ndarray,
+    velocity: np.ndarray,
     course: np.ndarray,
-    speed: np.ndarray,
-    radius: np.ndarray,
-    brakes: np.ndarray,
+    pace: np.ndarray,
+    shift: np.ndarray,
+    length: np.ndarray,
+    brake: np.ndarray,
     present: np.ndarray,
     slow: np.ndarray,
-) -> None:
-    """Set `slow` (k,) to 0 for whoever would come too near, before it could stop, to a moving one before it in the list.
+) -> bool:
+    """Set `slow` (k,) to 0 for each that would run into another ahead of it, as both move now, before it can stop.
 
-    Where small vehicles meet on purpose this comes on top of `give_way`: `radius` (k,) metres of the hulls, `brakes` (k,)
-    m/s2; all else as there. Who stands goes on standing until the other is past.
+    Whatever the rules say: on turns and off their legs vehicles are not where the rules look for them. `velocity` (k, 3)
+    m/s over ground; `shift` (k,) metres to starboard that each is about to go; `length` (k,) m; `brake` (k,) m/s2. One that
+    stands sets out where the way is free; of two that stand the first in the list does. Returns whether some are so near
+    that this is to be asked again soon.
     """
+    near = False
     for i in range(len(position)):
-        if not present[i] or (course[i, 0] == 0.0 and course[i, 1] == 0.0):
+        if not present[i]:
             continue
-        pace = max(speed[i], 0.5)
-        soon = pace / brakes[i] + 1.0
-        for j in range(i):
-            near = radius[i] + radius[j] + MARGIN
-            if not present[j] or speed[j] < 0.1 or abs(position[j, 2] - position[i, 2]) > near:
+        ux, uy, moving = _motion(velocity[i], course[i], pace[i], shift[i], length[i])
+        if ux == 0.0 and uy == 0.0:
+            continue
+        ahead = 1.5 + np.hypot(ux, uy) / brake[i]  # s: the next call is one away
+        for j in range(len(position)):
+            if j == i or not present[j]:
                 continue
-            px, py = position[j, 0] - position[i, 0], position[j, 1] - position[i, 1]
-            wx, wy = speed[j] * course[j, 0] - pace * course[i, 0], speed[j] * course[j, 1] - pace * course[i, 1]
-            if px * wx + py * wy >= 0.0:  # they part
+            px, py, pz = position[j] - position[i]
+            touch = REACH * (length[i] + length[j])
+            if abs(pz) > touch + abs(velocity[j, 2] - velocity[i, 2]) * ahead or px * ux + py * uy <= 0.0:
                 continue
-            when = min(-(px * wx + py * wy) / (wx * wx + wy * wy), soon)
-            if np.hypot(px + wx * when, py + wy * when) < near:
+            near |= np.hypot(px, py) < touch + ahead * (np.hypot(ux, uy) + np.hypot(velocity[j, 0], velocity[j, 1]))
+            vx, vy = velocity[j, 0], velocity[j, 1]
+            if not moving and i > j:
+                vx, vy, _ = _motion(velocity[j], course[j], pace[j], shift[j], length[j])
+            wx, wy = vx - ux, vy - uy
+            square = wx * wx + wy * wy
+            soon = min(max(-(px * wx + py * wy) / square, 0.0), ahead) if square > 1e-9 else 0.0
+            if np.hypot(px + wx * soon, py + wy * soon) < touch:
                 slow[i] = 0.0
+    return near
+
+
+@njit(cache=True)
+def _motion(
+    velocity: np.ndarray, course: np.ndarray, pace: float, shift: float, length: float
+) -> tuple[float, float, bool]:
+    """Return how one moves, m/s, and whether it does; of one that stands, how it is about to set out."""
+    if np.hypot(velocity[0], velocity[1]) > 0.1 * pace:
+        return velocity[0], velocity[1], True
+    x, y = 2 * length * course[0] + shift * course[1], 2 * length * course[1] - shift * course[0]
+    far = np.hypot(x, y)
+    if far == 0.0:
+        return 0.0, 0.0, False
+    return 0.3 * pace * x / far, 0.3 * pace * y / far, False
 
 
 @njit(cache=True)
