@@ -11,6 +11,7 @@ SAMPLES = {
     "sea": "west_ant_island",
     "harbour": "dalian_harbour",
     "ground": "plant_yard",
+    "tasks": "inspection_hall",
     "air": "farm_survey",
     "triage": "triage_drill",
 }
