@@ -35,6 +35,7 @@ MEANINGS = {
     "casualty": "somebody to be found (`quarterdeck triage`)",
     "medic": "where a medic starts (`quarterdeck triage`)",
     "rendezvous": "where UGVs and UAV meet (`quarterdeck triage`)",
+    "sounding": "a depth that was sounded, for the swath of a multibeam sonar (sensors.md)",
 }
 
 EXAMPLES = {
@@ -46,6 +47,7 @@ EXAMPLES = {
     "casualty": '{"role": "casualty", "id": "c1", "colour": "yellow"}',
     "medic": '{"role": "medic", "id": "medic-1"}',
     "rendezvous": '{"role": "rendezvous", "id": "gate"}',
+    "sounding": '{"role": "sounding", "depth": 7.4}',
 }
 
 
