@@ -134,9 +134,8 @@ def _routes(chart: Axes, mission: Mission, palette: list[str], *, faint: bool) -
 def _run(chart: Axes, mission: Mission, trace: Trace, palette: list[str]) -> None:
     """Draw the driven tracks, where anything was touched, and what of the plan's swaths was missed."""
     for i, colour in enumerate(palette[: len(trace.vehicles)]):
-        chart.add_collection(
-            LineCollection([np.column_stack([trace.x[:, i], trace.y[:, i]])], colors=colour, linewidths=0.7, zorder=6)
-        )
+        runs = [np.column_stack([trace.x[run, i], trace.y[run, i]]) for run in trace.known(i)]
+        chart.add_collection(LineCollection(runs, colors=colour, linewidths=0.7, zorder=6))
         touched = trace.contact[:, i]
         chart.plot(trace.x[touched, i], trace.y[touched, i], **CONTACT, zorder=9)
     if mission.spacing is None:

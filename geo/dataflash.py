@@ -1,5 +1,10 @@
 """ArduPilot's .bin logs: indexed by pymavlink, decoded a message type at a time."""
 
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,21 +28,14 @@ def read_dataflash(path: str, size: int) -> list[Log]:
         from pymavlink import DFReader
     except ImportError:
         raise UnavailableError(f"{path}: reading it needs pymavlink; pip install 'quarterdeck[logs]'") from None
-    try:
-        with DFReader.DFReader_binary(path) as reader:
-            while reader.recv_match(type=["MSG"], strict=True):
-                pass  # messages name the firmware, and so the modes
-            begun = tuple(float(start) for mode, start, _ in reader.flightmode_list() if mode == "AUTO")
-            tables = {name: _table(reader, name, size) for name in ("POS", "GPS", "ATT", "BAT")}
-            base = float(getattr(reader.clock, "timebase", 0.0) or 0.0)
-            read = sum(len(o) * f.len for o, f in ((reader.offsets[t], f) for t, f in reader.formats.items()))
-    except Exception as error:
-        raise InputError(f"{path}: is no sound ArduPilot log ({type(error).__name__}: {error})") from None
+    with _silence():
+        tables, begun, base, read = _decoded(DFReader.DFReader_binary, path, size)
     gps = tables["GPS"]
     gps = {n: v[gps["Status"] >= FIX] for n, v in gps.items()} if "Status" in gps else gps
-    place = tables["POS"] if len(tables["POS"].get("TimeUS", ())) else gps
-    if not len(place.get("TimeUS", ())):
+    placed = [t for t in (tables["POS"], gps) if {"Lat", "Lng"} <= set(t) and len(t["TimeUS"])]
+    if not placed:
         raise InputError(f"{path}: has no position in it: no POS message, and no GPS message with a fix")
+    place = placed[0]
     when = place["TimeUS"]
     height = place["RelHomeAlt"] if "RelHomeAlt" in place else place.get("Alt", np.full(len(when), np.nan))
     log = Log(
@@ -55,6 +53,44 @@ def read_dataflash(path: str, size: int) -> list[Log]:
         notes=(f"{path}: damaged: {size - read:,} bytes of it are no messages",) if size - read > PADDING else (),
     )
     return [log]
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Keep what pymavlink and its indexer, in C, print of damaged logs off standard output and error."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    kept = {number: os.dup(number) for number in (1, 2)}
+    with Path(os.devnull).open("wb") as nowhere:
+        for number in kept:
+            os.dup2(nowhere.fileno(), number)
+        try:
+            yield
+        finally:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            for number, copy in kept.items():
+                os.dup2(copy, number)
+                os.close(copy)
+
+
+def _decoded(kind: Any, path: str, size: int) -> tuple[dict[str, dict[str, np.ndarray]], tuple[float, ...], float, int]:
+    """Return the tables by message type, when AUTO began, the Unix time of power-on (0: not known), and the bytes read."""
+    reader = kind.__new__(kind)  # begun in two steps: closed even where the file is so damaged that it cannot be begun
+    try:
+        reader.__init__(path)
+        while reader.recv_match(type=["MSG"], strict=True):
+            pass  # messages name the firmware, and so the modes
+        begun = tuple(float(start) for mode, start, _ in reader.flightmode_list() if mode == "AUTO")
+        tables = {name: _table(reader, name, size) for name in ("POS", "GPS", "ATT", "BAT")}
+        base = float(getattr(reader.clock, "timebase", 0.0) or 0.0)
+        read = sum(len(reader.offsets[t]) * form.len for t, form in reader.formats.items())
+    except Exception as error:
+        raise InputError(f"{path}: is no sound ArduPilot log ({type(error).__name__}: {error})") from None
+    finally:
+        if hasattr(reader, "filehandle"):
+            reader.filehandle.close()
+    return tables, begun, base, read
 
 
 def _table(reader: Any, name: str, size: int) -> dict[str, np.ndarray]:

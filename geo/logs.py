@@ -154,7 +154,7 @@ CHUNK = 50_000  # rows of a CSV file turned into numbers at a time
 
 def _csv(path: str, data: bytes) -> list[Log]:
     try:
-        rows = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""))
+        rows = csv.reader(io.StringIO(data.decode("utf-8-sig", "replace"), newline=""))
         head = [name.strip().lower() for name in next(rows, [])]
         place = {n: next((head.index(a) for a in also if a in head), None) for n, also in COLUMNS.items()}
         lacking = [n for n in ("time", "lon", "lat") if place[n] is None]
@@ -163,8 +163,8 @@ def _csv(path: str, data: bytes) -> list[Log]:
         parts = []
         while chunk := list(islice(rows, CHUNK)):
             parts.append(_columns(chunk, place, len(head)))
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path}: is no CSV in UTF-8 ({error}); give a .bin, .tlog, .gpx or .csv") from None
+    except csv.Error as error:
+        raise InputError(f"{path}: is no CSV ({error}); give a .bin, .tlog, .gpx or .csv") from None
     figures = {n: np.concatenate([p[n] for p in parts]) for n in COLUMNS} if parts else {"time": np.empty(0)}
     told = ~np.isnan(figures["time"])
     if not told.any():

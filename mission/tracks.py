@@ -15,6 +15,7 @@ from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.mission import Mission, Route
 
 GAP, OFTEN = 10.0, 10.0  # s, and times the usual interval: a longer silence is a gap
+DAY = 86_400.0  # s: what is farther from the rest is of another mission, or has a wrong time
 LEAP = 10.0  # m beyond twice the greatest speed: a longer step is a jump
 BRIEF = 5.0  # s: fixes that jump away for no longer are wrong; for longer, it was moved
 FAR = 100_000.0  # m from the site: not this plan's
@@ -96,11 +97,11 @@ def _assigned(mission: Mission, given: str) -> list[tuple[str, Log]]:
     if vehicle not in ids:
         raise InputError(f"{path}: whose is it? Write --track VEHICLE={path}, with one of {', '.join(ids)}")
     own = [log for log in logs if log.vehicle == vehicle] or logs
-    if len(own) > 1:
+    if len({log.vehicle for log in own}) > 1:
         raise InputError(
             f"{path}: has {len(own)} tracks; write --track {vehicle}={path}#NAME, with one of {', '.join(inside)}"
         )
-    return [(vehicle, own[0])]
+    return [(vehicle, log) for log in own]
 
 
 def record(mission: Mission, files: Sequence[Sequence[tuple[str, Log]]], *, start: float | None = None) -> Record:
@@ -213,6 +214,11 @@ def _cleaned(mission: Mission, vehicle: Vehicle, log: Log) -> tuple[Track | None
         at = float(time[np.flatnonzero(np.diff(time) < 0)[0] + 1] - time[0])
         notes.append(f"{who}: its clock goes back {back} times, first {at:,.0f} s into it; {left:,} positions are left out")
     kept, time = kept[rising], time[rising]
+    days = np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) > DAY) + 1)
+    if len(days) > 1:
+        most = max(days, key=len)
+        notes.append(f"{who}: {len(time) - len(most):,} positions are more than a day from the rest and left out")
+        kept, time = kept[most], time[most]
     xy = mission.frame.to_metres(np.column_stack([log.lon[kept], log.lat[kept]]))
     good, leapt, told = _without_leaps(xy, time, 2 * vehicle.model.max_speed, who)
     notes += told

@@ -24,6 +24,7 @@ from quarterdeck.physics.swath import TOLERANCE, driven_tracks
 from quarterdeck.physics.trace import COLUMNS, UNKNOWN, Trace
 
 FINEST, COARSEST = 0.1, 1.0  # s between samples
+MOST = 1_000_000  # samples: of longer missions they are farther apart
 STILL = 0.05  # m/s: slower, it stands
 HULL = 1.0  # m over which a course is taken for the heading, where the log has none
 
@@ -98,6 +99,7 @@ def observed_trace(mission: Mission, tracks: Sequence[Track], followed: Sequence
     usual = [float(np.median(np.diff(t.time))) for t in tracks if len(t.time) > 1]
     step = float(np.clip(min(usual, default=COARSEST), FINEST, COARSEST))
     until = max((float(t.time[-1]) for t in tracks), default=0.0)
+    step = max(step, until / MOST)
     time = np.arange(int(np.ceil(until / step - 1e-9)) + 1) * step
     vehicles, count = mission.vehicles, len(mission.vehicles)
     table: dict[str, np.ndarray] = {n: np.zeros((len(time), count), dtype) for n, dtype in COLUMNS.items()}
