@@ -18,6 +18,7 @@ from quarterdeck.mission.mission import Mission, Route, Waypoint
 from quarterdeck.mission.timing import shortfalls
 
 TOLERANCE = 5.0  # m
+PINHOLE = {"focal_length", "sensor_width", "sensor_height", "image_width", "trigger_distance"}
 PART = 0.25  # of the height above ground: no tolerance is larger
 ACROSS = np.linspace(-1.0, 1.0, 9)  # where in a picture's width the ground is looked at
 
@@ -182,7 +183,7 @@ def _pictures(mission: Mission, vehicle: Vehicle, route: Route, terrain: Terrain
     Elements of Photogrammetry, ch. 6 and 18), taken across the track at every half cell of the terrain.
     """
     sensor = vehicle.sensor
-    if sensor is None or sensor.kind != "camera" or mission.spacing is None or not route.survey.any():
+    if sensor is None or mission.spacing is None or not sensor.parameters.keys() >= PINHOLE:
         return None
     camera, xyz, level = sensor.parameters, route.xyz, levels(route)
     deep, near = [], []
