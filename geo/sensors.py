@@ -12,8 +12,9 @@ from typing import Any
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Sensor
 
-# name: focal length mm, sensor width and height mm, image width and height pixels: round figures of common cameras, not
-# checked against the makers' data sheets
+# name: focal length mm, sensor width and height mm, image width and height pixels. The Sonys' are those of QGroundControl's
+# list (QGCCameraManager.cc), the RedEdge's of MicaSense's integration guide. DJI publishes pixels, format and equivalent
+# focal length alone: theirs are the formats' sizes (1 inch, 4/3) with the focal lengths that pictures' EXIF carry.
 CAMERAS: dict[str, tuple[float, float, float, int, int]] = {
     "dji-mavic-3e": (12.29, 17.3, 13.0, 5280, 3956),
     "dji-phantom-4-pro": (8.8, 13.2, 8.8, 5472, 3648),

@@ -19,6 +19,16 @@ def test_phantom_4_pro_at_100_metres():
     assert sensor.parameters["trigger_distance"] == pytest.approx(100.0 * 0.3)
 
 
+@pytest.mark.parametrize(
+    ("name", "equivalent"), [("dji-phantom-4-pro", 24.0), ("dji-mavic-3e", 24.0), ("sony-rx1r2", 35.0)]
+)
+def test_equivalent_focal_lengths_are_the_makers(name, equivalent):
+    """By the diagonals, 43.27 mm of a 35 mm picture, the focal length is that which the maker gives, within 3 %."""
+    focal, width, height, *pixels = CAMERAS[name]
+    assert focal * math.hypot(36, 24) / math.hypot(width, height) == pytest.approx(equivalent, rel=0.03)
+    assert pixels[0] / pixels[1] == pytest.approx(width / height, rel=0.01)
+
+
 @given(st.sampled_from(sorted(CAMERAS)), st.floats(0.002, 1.0))
 def test_resolution_gives_the_altitude_that_gives_it(name, resolution):
     """The altitude from a ground resolution yields that resolution, and a swath of so many pixels."""
