@@ -5,7 +5,7 @@ writes nothing. So an export is whole or not at all: every file is made and ever
 """
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from difflib import get_close_matches
@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 from quarterdeck.geo.errors import InputError
-from quarterdeck.geo.files import write_file
+from quarterdeck.geo.files import write_files
 from quarterdeck.geo.terrain import Terrain
-from quarterdeck.mission.check import trespasses, unsound
+from quarterdeck.mission.check import check_mission, unsound
 from quarterdeck.mission.follow import follow
-from quarterdeck.mission.heights import knows_ground, too_high
+from quarterdeck.mission.heights import knows_ground
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.sorties import sorties
 from quarterdeck.mission.timing import shortfalls
@@ -48,6 +48,8 @@ FORMATS: dict[str, tuple[str, dict[str, Any], str]] = {
     "rtz-1.1": ("rtz", {"version": "1.1"}, "the same, version 1.1"),
     "rtz-1.2": ("rtz", {"version": "1.2"}, "the same, version 1.2"),
 }
+
+SEEN = ("geojson", "html", "png", "qgis", "rerun")  # formats for people; all others something may follow
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +81,7 @@ def export(
     depart: datetime | None = None,
     split: bool = False,
     force: bool = False,
+    unsafe: bool = False,
     tell: Callable[[str], None] | None = None,
 ) -> list[Path]:
     """Write `mission` in each of the formats `to` (names of `FORMATS`) into the folder `out`; return the files' paths.
@@ -89,7 +92,8 @@ def export(
     mission beyond a
     vehicle's endurance is written as sorties (`mission.sorties`), each round into a folder `sortie-1`, `sortie-2` and on.
     `tell` is called with one line for each limit that the mission meets in a format. Raises InputError, and writes nothing,
-    for a plan that leaves the operating area or crosses a no-go zone, an unknown format, autopilot or altitude, two formats
+    for a plan that makes no sense; one that fails a check (`mission.check`) in a format that vehicles follow, unless
+    `unsafe`; an unknown format, autopilot or altitude, two formats
     that would write the same file, and where a file stands already and not `force`.
     """
     names = [to] if isinstance(to, str) else list(to)
@@ -108,17 +112,16 @@ def export(
         raise InputError("the plan was made over terrain and has changed since; export it with --terrain FILE")
     if ground is not None and knows_ground(mission):
         raise InputError("the plan knows its ground from the terrain; leave out --ground")
-    problems = unsound(mission) or trespasses(mission)
-    if problems:
-        more = f" (and {len(problems) - 1} more: `quarterdeck check` lists them)" if len(problems) > 1 else ""
-        raise InputError(f"the plan must not leave like this: {problems[0]}{more}; plan it again")
+    if problems := unsound(mission):
+        raise InputError(f"the plan makes no sense: {problems[0]}{_more(problems)}; plan it again")
     if altitude == "amsl" and not knows_ground(mission) and (ground is None or not math.isfinite(ground)):
         raise InputError("altitudes above mean sea level need the ground's: give --ground METRES, or --terrain FILE")
     settings = Settings(autopilot, lambda line: told.setdefault(line), altitude, ground or 0.0, storage, depart)
-    for line in (*mission.figures.get("notes", ()), *too_high(mission)):
+    for line in mission.figures.get("notes", ()):
         settings.tell(line)
     made: dict[str, bytes | str] = {}
-    for within, part in _parts(mission, split, settings, terrain, tolerance):
+    for within, part in _parts(mission, split, terrain, tolerance):
+        _check(part, names, settings, unsafe=unsafe)
         for name in dict.fromkeys(names):
             module, options, _ = _format(name)
             exporter = import_module(f"quarterdeck.exporters.{module}")
@@ -127,26 +130,19 @@ def export(
                     raise InputError(f"{name} and another of the formats both write {file}; export them one by one")
                 made[within + file] = content
     folder = Path(out)
-    paths = [folder / file for file in made]
-    standing = [path for path in paths if path.exists()]
-    if standing and not force:
-        raise InputError(f"{standing[0]} exists; give --force to overwrite it, or another folder with -o")
-    written = [write_file(path, content, force=force) for path, content in zip(paths, made.values(), strict=True)]
+    for file in made:
+        if not (folder / file).resolve().is_relative_to(folder.resolve()):  # names are made safe: a defect of ours
+            raise RuntimeError(f"{file} is not in the folder of the export")
+    written = write_files({folder / file: content for file, content in made.items()}, force=force)
     if tell is not None:  # only now, for a refusal is the only thing said
         for line in told:
             tell(line)
     return written
 
 
-def _parts(
-    mission: Mission, split: bool, settings: Settings, terrain: Terrain | None, tolerance: float
-) -> list[tuple[str, Mission]]:
+def _parts(mission: Mission, split: bool, terrain: Terrain | None, tolerance: float) -> list[tuple[str, Mission]]:
     """The missions to write and the folder of each: the mission itself, or its rounds of sorties."""
-    short = [line for route in mission.routes for line in shortfalls(mission.vehicle(route.vehicle), route)]
-    if not short:
-        return [("", mission)]
-    if not split:
-        settings.tell(f"{short[0]}; export with --sorties to have it split")
+    if not split or not any(shortfalls(mission.vehicle(route.vehicle), route) for route in mission.routes):
         return [("", mission)]
     if terrain is None and knows_ground(mission):
         raise InputError("sorties of a plan over terrain have new ways home; export them with --terrain FILE")
@@ -155,6 +151,22 @@ def _parts(
     if terrain is not None:
         away = [follow(part, terrain, tolerance=tolerance) for part in away]
     return [(f"sortie-{number}/", part) for number, part in enumerate(away, 1)]
+
+
+def _check(mission: Mission, names: Iterable[str], settings: Settings, *, unsafe: bool) -> None:
+    """Tell what a check of the mission finds. Raises InputError if it finds anything and something may follow the files."""
+    problems = check_mission(mission)
+    followed = [name for name in names if name not in SEEN]
+    if problems and followed and not unsafe:
+        short = any(shortfalls(mission.vehicle(route.vehicle), route) for route in mission.routes)
+        way = "plan it again, export it with --sorties" if short else "plan it again"
+        raise InputError(f"the plan fails a check: {problems[0]}{_more(problems)}; {way}, or give --unsafe to export it so")
+    for problem in problems:
+        settings.tell(f"the plan fails a check: {problem}")
+
+
+def _more(problems: Sequence[str]) -> str:
+    return f" (and {len(problems) - 1} more: `quarterdeck check` lists them)" if len(problems) > 1 else ""
 
 
 def _format(name: str) -> tuple[str, dict[str, Any], str]:

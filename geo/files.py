@@ -1,11 +1,12 @@
 """Reading files, and standard input; writing them beside, then renamed, so that none is ever half written; safe names."""
 
+import errno
 import os
 import re
 import sys
 import tempfile
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from quarterdeck.geo.errors import InputError
@@ -37,24 +38,46 @@ def write_file(path: Path, content: bytes | str, *, force: bool = False) -> Path
 
     Folders are made as needed. Raises InputError if the file exists and not `force`, or it cannot be written.
     """
-    refuse_existing(path, force=force)
-    data = content.encode("utf-8") if isinstance(content, str) else content
+    return write_files({path: content}, force=force)[0]
+
+
+def write_files(contents: Mapping[Path, bytes | str], *, force: bool = False) -> list[Path]:
+    """Write files that belong together, all or none: none is put in its place before all are written beside theirs.
+
+    Returns their paths. Raises InputError as `write_file` does.
+    """
+    for path in contents:
+        refuse_existing(path, force=force)
+    written: dict[Path, Path] = {}
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, beside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name[:40]}.")
+        for path, content in contents.items():
+            written[path] = _beside(path, content.encode("utf-8") if isinstance(content, str) else content)
+        for path, beside in written.items():
+            beside.replace(path)
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror or error}); choose another place with -o") from None
+    finally:
+        for beside in written.values():
+            beside.unlink(missing_ok=True)
+    return list(contents)
+
+
+def _beside(path: Path, data: bytes) -> Path:
+    """Write a file beside where it is to stand, under a name of its own, and return that. Raises OSError."""
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name[:40]}.")
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(data)
         umask = os.umask(0)
         os.umask(umask)
-        Path(beside).chmod(0o666 & ~umask)
-        Path(beside).replace(path)
-    except OSError as error:
-        Path(beside).unlink(missing_ok=True)
-        raise InputError(f"{path} cannot be written ({error.strerror or error}); choose another place with -o") from None
-    return path
+        Path(name).chmod(0o666 & ~umask)
+    except BaseException:  # a full disk, Ctrl-C
+        Path(name).unlink(missing_ok=True)
+        raise
+    return Path(name)
 
 
 def safe_names(names: Iterable[str]) -> dict[str, str]:

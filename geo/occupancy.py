@@ -16,7 +16,7 @@ from scipy.ndimage import distance_transform_edt
 from shapely import get_coordinates
 
 from quarterdeck.geo.errors import InputError
-from quarterdeck.geo.files import write_file
+from quarterdeck.geo.files import write_files
 from quarterdeck.geo.scanline import inside
 from quarterdeck.geo.scenario import Site
 
@@ -133,14 +133,11 @@ def write_map(occupancy: Occupancy, path: Path, *, force: bool = False) -> Path:
     picture = path.with_suffix(".pgm")
     if path.suffix not in (".yaml", ".yml"):
         raise InputError(f"{path}: a map is written as .yaml and .pgm; give a name that ends in .yaml")
-    if path.exists() and not force:
-        raise InputError(f"{path} exists; give --force to overwrite it, or another name")
     grey = np.zeros(occupancy.cells.shape, np.uint8)
     for state, level in IMAGE.items():
         grey[occupancy.cells == state] = level
     buffer = io.BytesIO()
     Image.fromarray(grey[::-1]).save(buffer, format="PPM")
-    write_file(picture, buffer.getvalue(), force=force)
     x, y = occupancy.origin
     document = {
         "image": picture.name,
@@ -151,7 +148,9 @@ def write_map(occupancy: Occupancy, path: Path, *, force: bool = False) -> Path:
         "free_thresh": 0.196,
     }
     # PyYAML's own numbers: 1e-12 would be read back as a text, 1.0e-12 is not.
-    return write_file(path, yaml.safe_dump(document, sort_keys=False, default_flow_style=None), force=force)
+    text = yaml.safe_dump(document, sort_keys=False, default_flow_style=None)
+    write_files({picture: buffer.getvalue(), path: text}, force=force)
+    return path
 
 
 def _number(path: Path, document: dict[str, Any], key: str, default: float | None = None) -> float:

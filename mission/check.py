@@ -17,6 +17,7 @@ from quarterdeck.mission.heights import too_high, too_steep
 from quarterdeck.mission.mission import Mission, Route, Waypoint
 from quarterdeck.mission.timing import shortfalls
 
+HIGHEST = 10_000.0  # m above ground: no height that somebody means
 TOLERANCE = 0.05  # m: positions in a PLAN are rounded, curves are polygons
 
 
@@ -25,12 +26,19 @@ def check_mission(mission: Mission) -> tuple[str, ...]:
 
     Checked are: numbers and order of times; staying in the operating area; clear of obstacles by each vehicle's clearance
     (its berth apart); survey legs in the areas; vehicles apart in time; energy and endurance with the reserve; ceilings and
-    rates of climb; a guards plan's coverage, by another way than it was planned; and what the planner itself found.
+    rates of climb; jumps; a guards plan's coverage, by another way than it was planned; and what the planner itself found.
     """
     broken = unsound(mission)
     if broken:
         return broken
-    problems = [*mission.reasons, *trespasses(mission), *_too_near(mission), *_astray(mission), *_meetings(mission)]
+    problems = [
+        *mission.reasons,
+        *trespasses(mission),
+        *_strange(mission),
+        *_too_near(mission),
+        *_astray(mission),
+        *_meetings(mission),
+    ]
     for route in mission.routes:
         problems += shortfalls(mission.vehicle(route.vehicle), route)
     problems += [*too_high(mission), *too_steep(mission), *unproved(mission)]
@@ -100,6 +108,27 @@ def _excess(leg: LineString, area: BaseGeometry) -> float:
     outside = leg.difference(area)
     points = shapely.points(shapely.get_coordinates(outside))
     return float(shapely.distance(points, area).max()) if len(points) else 0.0
+
+
+def _strange(mission: Mission) -> list[str]:
+    """Routes that nobody means: jumps, heights that are none, surveys at the ground by what flies."""
+    problems = []
+    for route in mission.routes:
+        vehicle, heights = mission.vehicle(route.vehicle), route.xyz[:, 2]
+        gap = np.hypot(*np.diff(route.xyz[:, :2], axis=0).T)
+        took = np.diff([w.time for w in route.waypoints]) - [w.hold for w in route.waypoints[:-1]]
+        jumps = np.flatnonzero(gap > vehicle.model.max_speed * 1.02 * (took + 0.01) + TOLERANCE)
+        problems += [
+            f"{route.vehicle}: leg {leg + 1} jumps {gap[leg]:,.1f} m in {took[leg]:.1f} s, faster than it can move"
+            for leg in jumps[:1].tolist()
+        ]
+        flies = vehicle.domain == "aerial"
+        odd = np.flatnonzero((heights < -TOLERANCE) | (heights > HIGHEST) if flies else np.abs(heights) > TOLERANCE)
+        sane = f"which must be from 0 to {HIGHEST:,.0f}" if flies else "and it does not fly"
+        problems += [f"{route.vehicle}: waypoint {i} is {heights[i]:,.1f} m above ground, {sane}" for i in odd[:1].tolist()]
+        low = np.flatnonzero(route.survey & (heights <= 0) & flies)
+        problems += [f"{route.vehicle}: waypoint {i} surveys at the ground; give it an altitude" for i in low[:1].tolist()]
+    return problems
 
 
 def _too_near(mission: Mission) -> list[str]:

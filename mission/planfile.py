@@ -244,6 +244,8 @@ def _check_types(mission: Mission) -> None:
             raise TypeError(f"its parameter {name} is {str(mission.parameters[name])[:40]!r}")
     if not fits(tuple(mission.figures.get("notes", ())), tuple[str, ...]):
         raise TypeError("its notes are no texts")
+    if not fits(mission.figures.get("notes", []), list) or not fits(mission.figures.get("cut", []), list):
+        raise TypeError("its figures are not what they must be")
     known = {None, *(task.id for task in mission.tasks)}
     if mission.method == "assign" and any(w.task not in known for r in mission.routes for w in r.waypoints):
         raise ValueError("a route has a task that is not among its tasks")

@@ -22,6 +22,7 @@ from quarterdeck.cli.parameters import Moment, Real
               help="ArduPilot: the board's storage in kB, which limits mission and fence.")  # fmt: skip
 @click.option("--depart", type=Moment(), help="When the mission begins, ISO 8601: RTZ schedules get times.")
 @click.option("--sorties", is_flag=True, help="Split what is beyond a vehicle's endurance into sorties, a folder each.")
+@click.option("--unsafe", is_flag=True, help="Export a plan that fails a check all the same; what it fails is told.")
 @force_option
 def command(
     plan: str,
@@ -31,11 +32,13 @@ def command(
     tolerance: float,
     storage: str,
     sorties: bool,
+    unsafe: bool,
     force: bool,
     **options: Any,
 ) -> None:
     """Write PLAN (a file, or - for standard input) in other formats; print the paths of the files, one a line.
 
+    A plan that `quarterdeck check` finds fault with is drawn, but not written for anything that would follow it.
     Every format and what it can't carry: docs/exports.md. A format that is not known is answered with the list.
     """
     from quarterdeck.exporters.export import FORMATS, export
@@ -47,7 +50,7 @@ def command(
         from quarterdeck.geo.terrain import read_terrain
 
         options["terrain"] = read_terrain(terrain, mission.frame, mission.site.operating.bounds)
-    options |= {"tolerance": tolerance, "storage": int(storage), "split": sorties, "force": force}
+    options |= {"tolerance": tolerance, "storage": int(storage), "split": sorties, "force": force, "unsafe": unsafe}
     for path in export(mission, names, Path(out), tell=_note, **options):
         click.echo(path)
 

@@ -177,7 +177,7 @@ def _run(scenario: Scenario, settings: Settings, seed: int, output: str, force: 
 
 def _generate(scenario: Scenario, count: int, seed: int, output: str, force: bool, options: dict[str, Any]) -> int:
     """Write cases of consecutive seeds: one to the output, several into a folder."""
-    from quarterdeck.geo.files import write_file
+    from quarterdeck.geo.files import safe_names, write_files
     from quarterdeck.geo.writer import site_text
     from quarterdeck.mission.triage.generate import generate
 
@@ -190,8 +190,8 @@ def _generate(scenario: Scenario, count: int, seed: int, output: str, force: boo
     if count == 1:
         emit(made[seed], output, force=force)
         return 0
-    for s, text in made.items():
-        write_file(Path(output) / f"{scenario.name}-{s:06d}.geojson", text, force=force)
+    name = safe_names([scenario.name])[scenario.name]
+    write_files({Path(output) / f"{name}-{s:06d}.geojson": text for s, text in made.items()}, force=force)
     console().print(f"{count} cases, seeds {seed} to {seed + count - 1}, in {output}")
     return 0
 

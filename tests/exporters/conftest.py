@@ -73,7 +73,7 @@ def drones(count: int = 3) -> Mission:
         up = Waypoint(*start, 40.0, "takeoff", 2.5)
         legs = lawnmower(20.0, i * 120.0 + 10.0, 200.0, 4, 30.0, 8.0, 40.0)
         back = Waypoint(*start, 40.0, "transit", 8.0)
-        down = Waypoint(*start, 0.0, "landing", 2.5)
+        down = Waypoint(*start, 0.0, "landing", 1.5)
         routes.append(timed(vehicle, [Waypoint(*start, 0.0, "start"), up, *legs, back, down]))
         vehicles.append(vehicle)
     site = Site(

@@ -93,20 +93,47 @@ def test_a_plan_that_trespasses_is_refused(boats, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_a_plan_that_fails_a_check_is_for_eyes_alone(boats, tmp_path):
+    """What jumps, flies without wings, is unfeasible or too near is drawn and told; a mission file needs --unsafe."""
+    route = boats.routes[0]
+
+    def changed(number, **values):
+        waypoints = [replace(w, **values) if i == number else w for i, w in enumerate(route.waypoints)]
+        return replace(boats, routes=(replace(route, waypoints=tuple(waypoints)), *boats.routes[1:]))
+
+    rock = Obstacle("rock", box(100.0, 12.0, 110.0, 18.0))
+    cases = {
+        "jumps": changed(3, x=200.0, y=31.0),
+        "does not fly": changed(3, z=5.0),
+        "no battery": replace(boats, reasons=("no battery",)),
+        "passes 'rock' at 2.00 m": replace(boats, site=replace(boats.site, obstacles=(rock,))),
+    }
+    for number, (why, mission) in enumerate(cases.items()):
+        with pytest.raises(InputError, match=f"fails a check: .*{why}.*--unsafe"):
+            export(mission, ["png", "qgc-wpl"], tmp_path / "refused")
+        said = []
+        export(mission, "geojson", tmp_path / f"drawn-{number}", tell=said.append)
+        assert any(why in line for line in said)
+        assert export(mission, "qgc-wpl", tmp_path / f"unsafe-{number}", unsafe=True)
+    assert not (tmp_path / "refused").exists()
+
+
 def test_the_way_home_is_told(boats, tmp_path):
     """A straight return that would cross a no-go zone is said when a mission file is written."""
-    rock = Obstacle("rock", box(100.0, 12.0, 110.0, 18.0))
+    rock = Obstacle("rock", box(100.0, 16.0, 110.0, 22.0))
     said = []
     export(replace(boats, site=replace(boats.site, obstacles=(rock,))), "qgc-wpl", tmp_path, tell=said.append)
     assert any("usv1" in line and "straight way home" in line for line in said)
 
 
 def test_what_is_too_far_is_told_or_split_into_sorties(boats, tmp_path):
-    """Without --sorties the shortfall is told; with it each round has a folder, and every file its own home and work."""
+    """Without sorties it is refused, unless unsafe; with them each round has a folder, each file its own home and work."""
     vehicles = tuple(replace(v, endurance=1200.0) for v in boats.vehicles)
     far, said = replace(boats, vehicles=vehicles), []
-    export(far, "qgc-wpl", tmp_path / "whole", tell=said.append)
-    assert any("--sorties" in line for line in said)
+    with pytest.raises(InputError, match=r"short by .* --sorties, or give --unsafe"):
+        export(far, "qgc-wpl", tmp_path / "whole")
+    export(far, "qgc-wpl", tmp_path / "whole", unsafe=True, tell=said.append)
+    assert any("fails a check: usv1: needs" in line for line in said)
     paths = export(far, ["qgc-wpl", "gpx"], tmp_path / "parts", split=True)
     assert {p.parent.name for p in paths} == {"sortie-1", "sortie-2"}
     assert sum(p.name == "usv1.waypoints" for p in paths) == 2
