@@ -82,7 +82,7 @@ def load_model(name: str) -> VehicleModel:
     if name.endswith(".toml"):
         try:
             text = Path(name).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
+        except (OSError, ValueError) as error:
             raise InputError(f"vehicle file {name}: cannot be read ({error}); give the path of a TOML file") from None
     elif name in model_names():
         text = (_folder() / f"{name}.toml").read_text(encoding="utf-8")
@@ -92,7 +92,7 @@ def load_model(name: str) -> VehicleModel:
         raise InputError(f"unknown vehicle model {name!r}; {hint}")
     try:
         return _model(tomllib.loads(text), name if name.endswith(".toml") else "")
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"vehicle file {name}: not valid TOML: {error}") from None
     except InputError as error:
         raise InputError(f"vehicle file {name}: {error}") from None

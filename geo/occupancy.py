@@ -5,6 +5,8 @@ The format is that of ROS map_server and nav2_map_server: https://docs.ros.org/e
 
 import io
 import math
+import struct
+import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -93,7 +95,7 @@ def read_map(source: str | Path) -> Occupancy:
     path = Path(source)
     try:
         document = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+    except (OSError, ValueError, TypeError, RecursionError, yaml.YAMLError) as error:
         raise InputError(f"{path}: cannot be read ({_one_line(error)}); give the .yaml of a map_server map") from None
     if not isinstance(document, dict) or not isinstance(document.get("image"), str):
         raise InputError(f'{path}: is no map_server map; it must say "image", "resolution" and "origin"')
@@ -107,16 +109,20 @@ def read_map(source: str | Path) -> Occupancy:
     if not 0 <= free <= occupied <= 1:
         raise InputError(f"{path}: free_thresh {free:g} and occupied_thresh {occupied:g} must rise from 0 to 1")
     if negate not in (0, 1):
-        raise InputError(f"{path}: negate must be 0 or 1, not {negate!r}")
+        raise InputError(f"{path}: negate must be 0 or 1, not {_short(negate)}")
     if not (isinstance(origin, list) and len(origin) == 3 and all(_is_number(v) for v in origin)):
-        raise InputError(f"{path}: origin must be [x, y, yaw], not {origin!r}")
+        raise InputError(f"{path}: origin must be [x, y, yaw], not {_short(origin)}")
     if document.get("mode", "trinary") not in ("trinary", "scale"):
-        raise InputError(f"{path}: mode {document['mode']!r} is not known; use trinary or scale")
+        raise InputError(f"{path}: mode {_short(document['mode'])} is not known; use trinary or scale")
     picture = path.parent / document["image"]
     try:
-        with Image.open(picture) as image:
+        with warnings.catch_warnings(action="ignore"), Image.open(picture) as image:
+            if image.width * image.height > MAX_CELLS:
+                raise InputError(f"{picture}: has {image.width:,} x {image.height:,} cells, more than {MAX_CELLS:,}")
             grey = np.asarray(image.convert("L"), dtype=float)
-    except (OSError, ValueError) as error:
+    except InputError:
+        raise
+    except (OSError, ValueError, SyntaxError, struct.error, ArithmeticError, Image.DecompressionBombError) as error:
         raise InputError(f"{picture}: cannot be read as an image ({_one_line(error)})") from None
     darkness = (grey if negate else 255.0 - grey) / 255.0
     cells = np.full(grey.shape, UNKNOWN, np.int8)
@@ -156,12 +162,17 @@ def write_map(occupancy: Occupancy, path: Path, *, force: bool = False) -> Path:
 def _number(path: Path, document: dict[str, Any], key: str, default: float | None = None) -> float:
     value = document.get(key, default)
     if not _is_number(value):
-        raise InputError(f"{path}: {key} must be a number, not {value!r}")
+        raise InputError(f"{path}: {key} must be a number, not {_short(value)}")
     return float(value)  # type: ignore[arg-type]
 
 
 def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e12
+
+
+def _short(value: object) -> str:
+    """Return a few words for a value: lists whose items are one another can be endless when written out."""
+    return f"a {type(value).__name__} of {len(value)}" if isinstance(value, list | dict) else repr(value)[:40]
 
 
 def _one_line(error: Exception) -> str:

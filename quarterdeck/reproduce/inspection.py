@@ -75,7 +75,7 @@ def read_distances(source: str | None) -> np.ndarray:
         return travel(hall()).ways[0].steps[:7, :7]
     try:
         matrix = np.array(json.loads(Path(source).read_text(encoding="utf-8"))["dist"], dtype=float)
-    except (OSError, ValueError, KeyError, TypeError, ArithmeticError) as error:
+    except (OSError, ValueError, KeyError, TypeError, ArithmeticError, RecursionError) as error:
         raise InputError(f'{source}: cannot be read ({error}); it must hold {{"dist": 7 x 7 metres}}') from None
     if matrix.shape != (7, 7) or not np.allclose(matrix, matrix.T) or not (matrix >= 0).all():
         raise InputError(f"{source}: dist must be 7 x 7 metres, symmetric and from 0")

@@ -1,5 +1,6 @@
 """Writing files: whole or not at all, all or none, never where they do not belong."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -34,9 +35,7 @@ def test_a_disk_that_is_full_leaves_nothing(tmp_path, monkeypatch):
     path.write_text("old")
 
     class Full:
-        def __init__(self, handle, mode):
-            import os
-
+        def __init__(self, handle, mode):  # noqa: ARG002
             os.close(handle)
 
         def __enter__(self):
@@ -45,7 +44,7 @@ def test_a_disk_that_is_full_leaves_nothing(tmp_path, monkeypatch):
         def __exit__(self, *_):
             return None
 
-        def write(self, data):
+        def write(self, data):  # noqa: ARG002
             raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("quarterdeck.geo.files.os.fdopen", Full)
