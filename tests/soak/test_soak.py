@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fuzzing.pool import Worker
-from fuzzing.targets import plan_arguments, small_site, targets
+from fuzzing.targets import make_sound, targets
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="memory is measured as Linux tells it")
 
@@ -21,19 +21,14 @@ def worker():
 
 
 @pytest.fixture(scope="module")
-def plans(worker):
-    """Return sound PLANs by name."""
-    made = {}
-    for name, args in plan_arguments().items():
-        told = worker.run({"site.geojson": small_site()}, args, want=True)
-        assert told["status"] == 0, told
-        made[name] = told["out"].encode()
-    return made
+def sound(worker):
+    """Return sound PLANs and what comes of them, by name."""
+    return make_sound(worker.run)
 
 
-def test_damaged_input(worker, plans, soak_cases, soak_from, tmp_path_factory):
+def test_damaged_input(worker, sound, soak_cases, soak_from, tmp_path_factory):
     """Every reader and every verb: a result, or one line and exit status 2; no crash, hang, flood or half a file."""
-    known = targets(plans)
+    known = targets(sound)
     names = list(known)
     weights = np.array([weight for weight, _ in known.values()], dtype=float)
     ended, seconds, broken = Counter(), Counter(), {}

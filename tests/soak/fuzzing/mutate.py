@@ -77,7 +77,7 @@ def damaged(name: str, data: bytes, rng: np.random.Generator) -> bytes:
             return _xml(data, rng)
         if suffix in (".kmz", ".npz"):
             return _zip(data, rng)
-        if suffix in (".toml", ".yaml", ".asc"):
+        if suffix in (".toml", ".yaml", ".asc", ".csv"):
             return _text(data, rng)
     except (ValueError, KeyError, IndexError, TypeError, RecursionError):  # what cannot be damaged so, is so
         pass

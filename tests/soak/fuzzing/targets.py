@@ -161,6 +161,43 @@ casualties = [1, 3]
 medic_speed = { uniform = [1.0, 1.6] }
 treat = [10, 60]
 """
+LOG = b"vehicle,time,lat,lon,height,speed\n" + b"".join(
+    b"v1,%d,%.7f,%.7f,0,1.0\n" % (t, 54 + t / 111000 / 4, 10 + t / 65000) for t in range(0, 40, 2)
+)
+TRACK = (
+    '<gpx xmlns="http://www.topografix.com/GPX/1/1" version="1.1" creator="t"><trk><name>v1</name><trkseg>'
+    + "".join(
+        f'<trkpt lat="{54 + t / 444000:.7f}" lon="{10 + t / 65000:.7f}"><time>2026-05-01T09:00:{t:02}Z</time></trkpt>'
+        for t in range(0, 40, 2)
+    )
+    + "</trkseg></trk></gpx>"
+).encode()
+CHANGES = json.dumps(
+    {
+        "type": "FeatureCollection",
+        "features": [
+            {
+                "type": "Feature",
+                "geometry": None,
+                "properties": {"role": "vehicle", "id": "v2", "change": "remove", "since": 20},
+            },
+            {"type": "Feature", "geometry": None, "properties": {"role": "obstacle", "id": "shed", "change": "remove"}},
+            {
+                "type": "Feature",
+                "geometry": None,
+                "properties": {"role": "vehicle", "id": "v1", "change": "set", "speed": 0.5},
+            },
+            {
+                "type": "Feature",
+                "geometry": {
+                    "type": "Polygon",
+                    "coordinates": [[[10.0005, 54.0001], [10.0006, 54.0001], [10.0006, 54.0002], [10.0005, 54.0001]]],
+                },
+                "properties": {"role": "obstacle", "id": "wreck"},
+            },
+        ],
+    }
+).encode()
 DISTANCES = json.dumps({"dist": [[abs(i - j) * 2.0 for i in range(7)] for j in range(7)]}).encode()
 
 
@@ -186,6 +223,19 @@ def _terrain_npz() -> bytes:
     return made.getvalue()
 
 
+def _raster() -> dict[str, bytes]:
+    """Return a GeoTIFF about the small site, where there is rasterio to make and read it."""
+    try:
+        import rasterio
+    except ImportError:
+        return {}
+    look = {"driver": "GTiff", "width": 12, "height": 12, "count": 1, "dtype": "float32", "crs": "EPSG:4326"}
+    with rasterio.MemoryFile() as made:
+        with made.open(**look, transform=rasterio.Affine(0.0005, 0, 9.998, 0, -0.0005, 54.003)) as file:
+            file.write(np.add.outer(np.arange(12.0), np.zeros(12)).astype(np.float32), 1)
+        return {"terrain.tif": made.read()}
+
+
 def sites() -> dict[str, bytes]:
     """Return sound sites by file name, one of each format and kind."""
     own = {path.name: path.read_bytes() for path in sorted(DATA.glob("*.geojson"))}
@@ -193,24 +243,40 @@ def sites() -> dict[str, bytes]:
     return own | small | {"site.kml": KML, "site.kmz": packed({"doc.kml": KML}), "site.gpx": GPX, "site.plan": QGC}
 
 
-def plan_arguments() -> dict[str, list[str]]:
-    """Return the command lines that make the sound PLANs from `site.geojson`, by the plans' names."""
-    return {
-        "stc.geojson": ["plan", "site.geojson", "--method", "stc"],
-        "lines.geojson": ["plan", "site.geojson", "--method", "lines", "--run", "4"],
-        "guards.geojson": ["plan", "site.geojson", "--method", "guards", "--range", "25"],
-        "tasks.geojson": ["assign", "site.geojson", "--iterations", "2"],
-    }
+SOUND = {  # PLANs and what comes of them, each made of those before it
+    "stc.geojson": ["plan", "site.geojson", "--method", "stc"],
+    "lines.geojson": ["plan", "site.geojson", "--method", "lines", "--run", "4"],
+    "guards.geojson": ["plan", "site.geojson", "--method", "guards", "--range", "25"],
+    "tasks.geojson": ["assign", "site.geojson", "--iterations", "2"],
+    "report.json": ["simulate", "stc.geojson", "--json"],
+    "trace.npz": ["simulate", "stc.geojson", "--trace"],
+}
 
 
-def targets(plans: dict[str, bytes]) -> dict[str, tuple[int, Maker]]:
-    """Return each target's weight and what makes a request for it; `plans` are sound PLANs by name."""
+def make_sound(run: Callable[..., dict]) -> dict[str, bytes]:
+    """Return the files of SOUND, made by the command line; `run` is a worker's."""
+    made: dict[str, bytes] = {}
+    for name, args in SOUND.items():
+        last = [] if args[-1] == "--json" else [f"out/{name}"] if args[-1] == "--trace" else ["-o", f"out/{name}"]
+        if args[-1] == "--json":
+            args, last = args[:-1], ["--report", f"out/{name}"]
+        told = run({"site.geojson": small_site()} | made, [*args, *last], want=f"out/{name}")
+        if told["broken"] or not told["made"]:
+            raise RuntimeError(f"{name}: {told}")
+        made[name] = told["made"]
+    return made
+
+
+def targets(sound: dict[str, bytes]) -> dict[str, tuple[int, Maker]]:
+    """Return each target's weight and what makes a request for it; `sound` are the files of SOUND."""
     whole = sites()
+    plans = {name: data for name, data in sound.items() if name.endswith(".geojson")}
+    logs = {"log.csv": LOG, "log.gpx": TRACK, "trace.npz": sound["trace.npz"]}
     small = {name: whole[name] for name in ("ground.geojson", "surface.geojson", "aerial.geojson")}
     toml = {path.name: path.read_bytes() for path in sorted((DATA / "vehicles").glob("*.toml"))}
     pictures = {"map.pgm": _image()}
     chart = {name: (DATA / name).read_bytes() for name in ("sample_chart.000", "sample_chart.001")}
-    terrains = {"terrain.asc": TERRAIN, "terrain.npz": _terrain_npz()}
+    terrains = {"terrain.asc": TERRAIN, "terrain.npz": _terrain_npz()} | _raster()
 
     def check_site(rng: np.random.Generator) -> Request:
         name, data = _one(whole, rng)
@@ -305,8 +371,12 @@ def targets(plans: dict[str, bytes]) -> dict[str, tuple[int, Maker]]:
     def replan(rng: np.random.Generator) -> Request:
         name, data = _one(plans, rng)
         args = ["replan", name, "-o", "out/after.geojson", "--at", _pick(rng, "0", "20", "100", "1e9", *ODD)]
-        if rng.random() < 0.5:
+        kind = rng.random()
+        if kind < 0.4:
             files = {name: damaged(name, data, rng)}
+        elif kind < 0.7:
+            files = {name: data, "changes.geojson": damaged("a.geojson", CHANGES, rng)}
+            args += ["--changes", "changes.geojson"]
         else:
             files = {name: data, "add.geojson": damaged("a.geojson", small["ground.geojson"], rng)}
             args += ["--add", "add.geojson"]
@@ -338,6 +408,19 @@ def targets(plans: dict[str, bytes]) -> dict[str, tuple[int, Maker]]:
         return Request(
             plans | files, ["campaign", "study.toml", "-o", "out/runs", "--jobs", "1", *_options(rng, "--least", "--worst")]
         )
+
+    def report(rng: np.random.Generator) -> Request:
+        name, data = _one(logs, rng)
+        files = {"stc.geojson": plans["stc.geojson"], name: damaged(name, data, rng)}
+        track = _pick(rng, name, f"v1={name}", f"v9={name}")
+        args = ["report", "stc.geojson", "--track", track, "--report", "out/r.json", *_options(rng, "--start", "--limit")]
+        return Request(files, [*args, *_pick(rng, [], [], ["--gaps", "out/gaps.geojson"], ["--json"])])
+
+    def replay(rng: np.random.Generator) -> Request:
+        which = _pick(rng, "report.json", "stc.geojson")
+        files = {"report.json": sound["report.json"], "stc.geojson": plans["stc.geojson"], "site.geojson": small_site()}
+        files[which] = damaged(which, files[which], rng)
+        return Request(files, _pick(rng, ["replay", "report.json"], ["replay", "stc.geojson", "--site", "site.geojson"]))
 
     def reproduce(rng: np.random.Generator) -> Request:
         if rng.random() < 0.7:
@@ -404,6 +487,8 @@ def targets(plans: dict[str, bytes]) -> dict[str, tuple[int, Maker]]:
         "charts": (5, charts),
         "campaign": (2, campaign),
         "reproduce": (1, reproduce),
+        "report": (6, report),
+        "replay": (2, replay),
         "arguments": (4, arguments),
     }
 
