@@ -74,7 +74,7 @@ def find_frames(data: np.ndarray, extra: np.ndarray) -> tuple[np.ndarray, np.nda
             system = np.int64(data[at + 5])
         if kind < 256 and extra[kind] >= 0:
             end = at + head + length
-            if _checksum(data[at + 1 : end], extra[kind]) == np.int64(data[end]) + 256 * np.int64(data[end + 1]):
+            if checksum(data[at + 1 : end], extra[kind]) == np.int64(data[end]) + 256 * np.int64(data[end + 1]):
                 starts[count], kinds[count], systems[count], lengths[count] = at, kind, system, length
                 count += 1
         at += whole + 8
@@ -82,7 +82,7 @@ def find_frames(data: np.ndarray, extra: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 @njit(cache=True)
-def _checksum(data: np.ndarray, extra: int) -> int:
+def checksum(data: np.ndarray, extra: int) -> int:
     """Return MAVLink's checksum, CRC-16/MCRF4XX, over the bytes and the message's own."""
     crc: Any = np.int64(0xFFFF)
     for i in range(len(data) + 1):
