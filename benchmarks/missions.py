@@ -20,7 +20,7 @@ import shapely
 from scipy.spatial import cKDTree
 
 from quarterdeck.mission.mission import Mission
-from quarterdeck.mission.recovery import recovering
+from quarterdeck.mission.recovery import recovering, undone
 from quarterdeck.mission.routes import survey_tracks
 from quarterdeck.physics.paths import LEGS
 from quarterdeck.physics.seen import seen_fraction, whole_tracks
@@ -38,6 +38,7 @@ class Watched:
     served: Counter[str] = field(default_factory=Counter)
     order: list[str] = field(default_factory=list)
     plans: list[tuple[float, Mission]] = field(default_factory=list)
+    undone: tuple[str, ...] = ()
 
 
 def run_case(case: Any) -> tuple[Run, Watched]:
@@ -50,7 +51,9 @@ def run_case(case: Any) -> tuple[Run, Watched]:
             if event.kind == "served":
                 watched.served[event.subject] += 1
                 watched.order.append(event.subject)
-        return director(now, states, events, memory)
+        commands, after = director(now, states, events, memory)
+        watched.undone = undone(after)
+        return commands, after
 
     total = sum(r.duration for r in case.mission.routes)
     run = simulate(
@@ -86,7 +89,8 @@ def judge(case: Any, run: Run, watched: Watched) -> list[str]:
             wrong.append(f"{v.id} is {away:.1f} m from home at the end" + (", not done" if not v.finished else ""))
         if v.energy > vehicle.battery:
             wrong.append(f"{v.id} used {v.energy:.1f} Wh of {vehicle.battery:.1f} Wh")
-    if lost | silent != {v.id for v in mission.vehicles} and not last.reasons:
+    wrong += [line for line in watched.undone if line.startswith("no new plan")]
+    if lost | silent != {v.id for v in mission.vehicles} and not last.reasons and not watched.undone:
         wrong += _undone(mission, run, watched, last, any(f.kind == "comms" for f in case.faults))
     return wrong
 
