@@ -60,7 +60,7 @@ def draw_case(seed: int) -> Case:
 
 
 def _scenario(kind: str, domain: str, rng: np.random.Generator) -> Scenario:
-    count = int(min(1 + rng.geometric(0.3), 12)) if rng.random() < 0.92 else 1
+    count = int(min(1 + rng.geometric(0.3), 6 if kind == "guards" else 12)) if rng.random() < 0.92 else 1
     models = [load_model(m) for m in FLEETS[domain]]
     model = models[int(rng.integers(len(models)))]
     spacing = SPACING[model.name]
@@ -164,7 +164,7 @@ def _tasks(room: MultiPolygon, robots: int, across: float, rng: np.random.Genera
 def _planned(kind: str, scenario: Scenario, rng: np.random.Generator) -> Mission:
     seed = int(rng.integers(1000))
     if kind == "guards":
-        return plan_guards(scenario, range=float(scenario.spacing or 0.0) * rng.uniform(1.5, 3.0), seed=seed)
+        return plan_guards(scenario, range=float(scenario.spacing or 0.0) * rng.uniform(2.0, 3.5), seed=seed)
     if kind == "tasks":
         return assign(scenario, iterations=30, seed=seed)
     if kind == "lines":

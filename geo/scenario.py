@@ -82,7 +82,8 @@ class Vehicle:
     last track ends. `share` is the part of the area it covers, None
     where shares are to follow from speeds. `speed` m/s, `turn_radius`, `clearance` and `range` (how far it sees) metres,
     `endurance` seconds, `battery` watt-hours, `altitude` metres above ground (aerial only); all of its flight stays
-    below `ceiling` metres above ground and `ceiling_amsl` above mean sea level; `can` its capabilities.
+    below `ceiling` metres above ground and `ceiling_amsl` above mean sea level; `can` its capabilities,
+    `heading` radians in which it is under way at its start (None: it lies still).
     """
 
     id: str
@@ -102,6 +103,7 @@ class Vehicle:
     returns: bool = True
     ceiling: float = CEILING
     ceiling_amsl: float = float("inf")
+    heading: float | None = None
 
     @property
     def domain(self) -> Domain:

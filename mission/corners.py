@@ -90,6 +90,32 @@ def _curve(
     return 1.0, None
 
 
+def entered(path: Driven, heading: float, radius: float, space: MultiPolygon) -> Driven:
+    """Return the path begun with a curve, where one has room, from `heading` radians at its first point into its first leg.
+
+    `radius` metres and `space` as in `with_turns`.
+    """
+    if radius <= 0 or len(path.points) < 2:
+        return path
+    start, step = path.points[0], path.points[1] - path.points[0]
+    length, course = float(np.hypot(*step)), math.atan2(step[1], step[0])
+    if length == 0 or abs((course - heading + math.pi) % math.tau - math.pi) < COARSE:
+        return path
+    for part in PACES:
+        for off in (*(n * part * radius for n in (4, 3, 2, 1)), length):
+            goal = start + min(off, length) / length * step
+            for curve in dubins_paths((*start, heading), (*goal, course), part * radius, COARSE):
+                if space.covers(LineString(curve)):
+                    new = len(curve) - 1
+                    return Driven(
+                        np.concatenate([path.points[:1], curve[1:], path.points[1:]]),
+                        [path.legs[0], *["turn"] * new, *path.legs[1:]],  # type: ignore[list-item]
+                        np.concatenate([path.pace[:1], np.full(new, part), path.pace[1:]]),
+                        np.concatenate([path.stops[:1], np.zeros(new, dtype=bool), path.stops[1:]]),
+                    )
+    return path
+
+
 def driven(points: np.ndarray, radius: float) -> np.ndarray:
     """Return the (m, 2) polyline with the corners of (n, 2) `points` rounded to arcs of `radius` metres where they fit."""
     points = np.asarray(points, dtype=float)

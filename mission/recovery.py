@@ -124,6 +124,7 @@ def _replanned(
         energy={v: s.energy_used - used.get(v, 0.0) for v, s in states.items()},
         tracks=tuple(tracks),
         served=now.served,
+        headings={v: s.heading for v, s in states.items()},
     )
     wrecks = {w.id: w for v in sorted(now.given_up) if (w := _wreck(first, v, working, states)) is not None}
     known = {o.id for o in now.mission.site.obstacles}

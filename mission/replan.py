@@ -84,7 +84,8 @@ def _moved(vehicle: Vehicle, progress: Progress) -> Vehicle:
     used = progress.energy.get(vehicle.id, 0.0)
     left = energy_left(vehicle.battery, used)
     endurance = energy_left(vehicle.endurance, progress.time)
-    return replace(vehicle, start=(x, y), end=vehicle.home, battery=left, endurance=endurance)
+    heading = progress.headings.get(vehicle.id)
+    return replace(vehicle, start=(x, y), end=vehicle.home, battery=left, endurance=endurance, heading=heading)
 
 
 def _homes(site: Site, vehicles: tuple[Vehicle, ...]) -> tuple[tuple[Vehicle, ...], list[str]]:

@@ -7,9 +7,9 @@ from shapely import LineString, Point
 from shapely.ops import substring
 
 from quarterdeck.coverage.metrics import straight_pieces
-from quarterdeck.geo.scenario import Vehicle
+from quarterdeck.geo.scenario import Vehicle, as_multipolygon
 from quarterdeck.geo.transit import Roadmap, shortest_paths, straight
-from quarterdeck.mission.corners import driven, with_turns
+from quarterdeck.mission.corners import driven, entered, with_turns
 from quarterdeck.mission.mission import Leg, Route, unbroken
 from quarterdeck.mission.timing import shortfalls, timed_route
 
@@ -67,6 +67,9 @@ def way_routes(
     routes, reasons = [], []
     for i, (vehicle, (points, legs), road) in enumerate(zip(vehicles, ways, roads, strict=True)):
         path = with_turns(points, legs, vehicle.turn_radius, road.polygon)
+        if vehicle.heading is not None:
+            room = road.polygon.buffer(0.5 * vehicle.clearance)  # half the clearance is for being off one's path
+            path = entered(path, vehicle.heading, vehicle.turn_radius, as_multipolygon(room))
         xyz, kinds, pace = np.column_stack([path.points, np.zeros(len(path.points))]), path.legs, path.pace
         holds = np.where(path.stops, PIVOT / vehicle.model.turn_rate, 0.0)
         if vehicle.domain == "aerial" and len(xyz) > 1:

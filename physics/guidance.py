@@ -68,6 +68,7 @@ def guide_vessels(
             course = np.arctan2(ty, tx) - np.arctan2(cross + kappa * t.integral, ahead)
             wx, wy = wanted * np.cos(course) - t.driftx, wanted * np.sin(course) - t.drifty
         else:
+            course = psi
             px, py = table[t.leg].x - x, table[t.leg].y - y
             away = np.hypot(px, py)
             gain = min(0.15, 0.5 / max(away, 1e-9))
@@ -77,9 +78,12 @@ def guide_vessels(
                 heading[i], speed[i] = psi, 0.0
                 continue
         if np.hypot(wx, wy) < 0.1:
-            heading[i], speed[i] = psi, 0.0
+            heading[i], speed[i] = course if t.mode == SAIL else psi, 0.0
             continue
         heading[i] = np.arctan2(wy, wx)
+        if t.mode == SAIL and ground < 0.3 and abs(_wrap(heading[i] - psi)) > 1.0:  # without way on: on the spot
+            speed[i] = 0.0
+            continue
         # Far off its heading it slows down, to as little as half: the turn is the tighter.
         ease = min(max(1.5 - 0.625 * abs(_wrap(heading[i] - psi)), 0.5), 1.0)
         speed[i] = min(np.hypot(wx, wy), lim.max_speed) * ease

@@ -61,8 +61,10 @@ def give_way(
                 if passing < along < berth + speed[i] * HORIZON and abs(aft) < berth:
                     one, other = aft + 1.1 * berth, aft - 1.1 * berth
                     want[i], instead[i] = (one, other) if one < -other else (other, one)
-                    if along < 1.5 * berth and abs(aft - aside[i]) < 0.7 * berth:  # not yet aside
-                        slow[i] = 0.0
+                    lack = 0.9 * berth - abs(aft - aside[i])
+                    if lack > 0.0:  # not yet aside: no faster than it gets there
+                        soon = 0.33 * (along - berth) / lack if along > berth else 0.0
+                        slow[i] = min(slow[i], pace[i] * (max(soon, 0.25) if soon > 0.0 else 0.0))
                 continue
             if speed[i] < 0.2 * pace[i]:  # about to start: those before it in the list go first
                 if np.hypot(px, py) < apart and i > j and pace[j] > 0.0:

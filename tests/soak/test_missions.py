@@ -1,0 +1,16 @@
+"""Missions of every kind in which random things go wrong: nobody touches anything, what was to be done is done or told."""
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("pybullet", reason="PyBullet is not installed")
+attempt = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "missions.py"))["attempt"]
+CASES = 24  # of the 1,000 that `python benchmarks/missions.py --cases 1000` runs
+
+
+@pytest.mark.parametrize("seed", range(CASES))
+def test_nothing_done_is_lost_and_nobody_is_hurt(seed):
+    """The mission is recovered; if not, `python benchmarks/missions.py --seed N` replays it."""
+    assert attempt(seed)["wrong"] == []
