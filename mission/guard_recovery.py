@@ -17,7 +17,7 @@ from quarterdeck.geo.scenario import Scenario, as_multipolygon
 from quarterdeck.geo.triangulation import Triangulation, triangulate
 from quarterdeck.geo.visibility import visibility_polygons
 from quarterdeck.mission.guard_routes import Team, Tours, guard_route, shorter_tours
-from quarterdeck.mission.guards import enter, guards_mission, vehicle_ranges
+from quarterdeck.mission.guards import enter, guard_ranks, guards_mission, vehicle_ranges
 from quarterdeck.mission.mission import Layer, Mission
 from quarterdeck.mission.timing import shortfalls
 
@@ -40,16 +40,19 @@ def guards_from_now(
     if mission.parameters.get("inspect") == "border":
         whole = replace(whole, target=border_of(whole.target))
     mesh = triangulate(whole.sight)
-    target = _unseen(mission, whole, mesh, served)
+    seen = _confirmed(mission, scenario, served)
+    target = _unseen(whole, mesh, seen)
     if target.area <= TOLERANCE * whole.target.area:
         target = shapely.MultiPolygon()
     space = replace(whole, target=target)
-    guards, owners = _left(mission, space, mesh, team, served)
+    guards, owners = _left(mission, space, mesh, team, seen)
     guards, hidden = mend(space, mesh, guards, float(ranges.min()))
     owners += [None] * (len(guards) - len(owners))
     net = network(space.reach, guards, team.starts)
     start = Tours(guards, net, _shared(net, owners, mission, team), (), (), np.zeros(len(ranges)), 0.0)
-    tours = _affordable(space, shorter_tours(space, start, team, effort=effort, seed=seed), team)
+    ranks = guard_ranks(scenario, space, mesh, guards, float(ranges.min())) if len(guards) else None
+    short = shorter_tours(space, start, team, ranks=ranks, effort=effort, seed=seed)
+    tours = _affordable(space, short, team, ranks)
     after = guards_mission(scenario, space, mesh, tours, team, ())
     lost = after.figures["certificate"]["uncovered"]
     reasons = [f"{lost:.6g} m2 can no longer be seen" + _why(hidden.area, lonely.area, lost)] if lost > 0 else []
@@ -57,7 +60,7 @@ def guards_from_now(
         after,
         parameters=mission.parameters,
         seed=seed,
-        layers=(_with_seen(after.layers[0], mission, served), *after.layers[1:]),
+        layers=(_with_seen(after.layers[0], seen), *after.layers[1:]),
         reasons=(*reasons, *after.reasons),
     )
 
@@ -76,20 +79,28 @@ def with_confirmed(mission: Mission, served: frozenset[str]) -> Mission:
     return replace(mission, layers=tuple(told(layer) for layer in mission.layers))
 
 
-def _confirmed(mission: Mission, served: frozenset[str]) -> list[tuple[shapely.Point, float]]:
-    """Return place and range of each guard whose observation is confirmed, now or before the mission was made."""
+def _confirmed(mission: Mission, scenario: Scenario, served: frozenset[str]) -> dict[int, tuple[shapely.Point, float]]:
+    """Return, by its place in the layer, where each guard is whose observation is confirmed, now or before, and its range.
+
+    One that an obstacle stood near that is gone does not count any more: it has not seen what the obstacle hid.
+    """
     layer = next(layer for layer in mission.layers if layer.name == "guards")
-    pairs = zip(layer.geometries, layer.properties, strict=True)
-    return [(place, float(p["range"])) for place, p in pairs if _done(p, served)]
+    here = {o.id for o in scenario.site.obstacles}
+    gone = shapely.union_all([o.polygon for o in mission.site.obstacles if o.id not in here])
+    return {
+        i: (place, float(p["range"]))
+        for i, (place, p) in enumerate(zip(layer.geometries, layer.properties, strict=True))
+        if _done(p, served) and not place.dwithin(gone, float(p["range"]))
+    }
 
 
 def _done(guard: Mapping[str, Any], served: frozenset[str]) -> bool:
     return bool(guard["seen"]) or f"guard-{guard['guard']}" in served
 
 
-def _with_seen(layer: Layer, mission: Mission, served: frozenset[str]) -> Layer:
+def _with_seen(layer: Layer, seen: Mapping[int, tuple[shapely.Point, float]]) -> Layer:
     """Return the guards' layer with those that are done, for whoever replans next."""
-    done = _confirmed(mission, served)
+    done = list(seen.values())
     first = len(layer.geometries)
     told = [
         {"guard": first + i, "range": reach, "vehicle": None, "turn": None, "seen": True}
@@ -98,9 +109,9 @@ def _with_seen(layer: Layer, mission: Mission, served: frozenset[str]) -> Layer:
     return replace(layer, geometries=(*layer.geometries, *(p for p, _ in done)), properties=(*layer.properties, *told))
 
 
-def _unseen(mission: Mission, space: Space, mesh: Triangulation, served: frozenset[str]) -> shapely.MultiPolygon:
+def _unseen(space: Space, mesh: Triangulation, seen: Mapping[int, tuple[shapely.Point, float]]) -> shapely.MultiPolygon:
     """Return the target less what confirmed observations have seen."""
-    done = _confirmed(mission, served)
+    done = list(seen.values())
     if not done:
         return space.target
     views = visibility_polygons(mesh, shapely.get_coordinates([p for p, _ in done]), np.array([r for _, r in done]))
@@ -108,14 +119,14 @@ def _unseen(mission: Mission, space: Space, mesh: Triangulation, served: frozens
 
 
 def _left(
-    mission: Mission, space: Space, mesh: Triangulation, team: Team, served: frozenset[str]
+    mission: Mission, space: Space, mesh: Triangulation, team: Team, seen: Mapping[int, tuple[shapely.Point, float]]
 ) -> tuple[np.ndarray, list[str | None]]:
     """Return the guards that are still needed, and the vehicle that was to pass each; in the order of the plan's tours."""
     layer = next(layer for layer in mission.layers if layer.name == "guards")
     places = shapely.get_coordinates(layer.geometries)
     inside = shapely.contains_xy(space.reach, places[:, 0], places[:, 1])
-    turns = [(p["turn"] is None, p["turn"] or 0, p["guard"]) for p in layer.properties]
-    order = [i for _, _, i in sorted(turns) if inside[i] and not _done(layer.properties[i], served)]
+    turns = [(p["turn"] is None, p["turn"] or 0, i) for i, p in enumerate(layer.properties)]
+    order = [i for _, _, i in sorted(turns) if inside[i] and i not in seen]
     views = visibility_polygons(mesh, places[order], float(team.ranges.min()))
     kept = [i for i, drop in zip(order, needless(space.target, views), strict=True) if not drop] if order else []
     return places[kept].reshape(-1, 2), [layer.properties[i]["vehicle"] for i in kept]
@@ -142,13 +153,13 @@ def _shared(net: Network, owners: list[str | None], mission: Mission, team: Team
     return tuple(tuple(guard_of[int(v)] for v in after.chosen[robot] if mine[v] == robot) for robot in range(k))
 
 
-def _affordable(space: Space, tours: Tours, team: Team) -> Tours:
+def _affordable(space: Space, tours: Tours, team: Team, ranks: np.ndarray | None) -> Tours:
     """Take the last guards from robots that cannot pay for them, and give them to others that can."""
     orders = [list(order) for order in tours.order]
 
     def driven() -> Tours:
         given = replace(tours, order=tuple(map(tuple, orders)))
-        return shorter_tours(space, given, team, exchange=False, effort=0.0)
+        return shorter_tours(space, given, team, ranks=ranks, exchange=False, effort=0.0)
 
     def pays(robot: int) -> bool:
         return not shortfalls(team.vehicles[robot], guard_route(team.vehicles[robot], tours, robot))

@@ -18,7 +18,7 @@ from quarterdeck.geo.scenario import Scenario, Vehicle, as_multipolygon
 from quarterdeck.geo.triangulation import Triangulation, triangulate
 from quarterdeck.geo.visibility import visibility_polygons
 from quarterdeck.mission.guard_routes import Team, Tours, guard_layers, guard_route, paper_tours, shorter_tours
-from quarterdeck.mission.mission import Mission
+from quarterdeck.mission.mission import Mission, undone
 from quarterdeck.mission.timing import shortfalls
 
 Mode = Literal["optimised", "paper"]
@@ -100,7 +100,7 @@ def guards_mission(
         figures=figures,
         bounds={"makespan": tours.bound},
         reasons=(*reasons, *short),
-        layers=guard_layers(tours, team),
+        layers=(*guard_layers(tours, team), *((undone([(rest, "unseen")]),) if rest.area > 0 else ())),
         input_hash=scenario.input_hash,
     )
 
@@ -109,14 +109,16 @@ def _optimised(scenario: Scenario, space: Space, mesh: Triangulation, paper: Tou
     """Return tours past few guards; past the paper's own where those would not be shorter than the paper's."""
     reach = float(team.ranges.min())
     few = fewer_guards(space, mesh, paper.guards, reach, seed=seed)
-    ranks = _ranks(scenario, space, mesh, few, reach)
+    ranks = guard_ranks(scenario, space, mesh, few, reach)
     tours = shorter_tours(space, paper_tours(space, few, team), team, ranks=ranks, seed=seed)
     if ranks is None and tours.makespan > paper.makespan:
         tours = shorter_tours(space, paper, team, seed=seed)
     return _seen_from_afar(space, mesh, tours, team, ranks, seed)
 
 
-def _ranks(scenario: Scenario, space: Space, mesh: Triangulation, guards: np.ndarray, reach: float) -> np.ndarray | None:
+def guard_ranks(
+    scenario: Scenario, space: Space, mesh: Triangulation, guards: np.ndarray, reach: float
+) -> np.ndarray | None:
     """Return (m,) ranks of guards: as high as the area that needs them; None where all areas are of one priority."""
     priorities = sorted({area.priority for area in scenario.site.areas}, reverse=True)
     if len(priorities) < 2:

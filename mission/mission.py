@@ -1,6 +1,6 @@
 """The mission: a route for each vehicle. Every planner ends in it; simulation, export and replanning start from it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -77,6 +77,13 @@ class Layer:
     name: str
     geometries: tuple[Any, ...]
     properties: tuple[Mapping[str, Any], ...]
+
+
+def undone(areas: Sequence[tuple[Any, str]]) -> Layer:
+    """Return the layer `undone`: areas, shapely in metres, that are not covered or seen, each with why."""
+    look = {"stroke": "#d62728", "fill": "#d62728", "fill-opacity": 0.3}
+    told = tuple({"why": why, "m2": round(float(area.area), 3), **look} for area, why in areas)
+    return Layer("undone", tuple(area for area, _ in areas), told)
 
 
 @dataclass(frozen=True, slots=True)

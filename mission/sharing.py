@@ -101,6 +101,12 @@ def share_out(team: Team, own: Sequence[Sequence[Line]], released: Sequence[Line
     return best
 
 
+def times(team: Team, lines: Sequence[Sequence[Line]]) -> np.ndarray:
+    """Return the (k,) seconds that vehicles are out if they drive these lines, by straight ways between them, and home."""
+    ends = [own[-1].points[-1] if own else here for own, here in zip(lines, team.here, strict=True)]
+    return np.array([_prefix(team, i, own)[-1] + team.home(i, ends[i]) for i, own in enumerate(lines)], dtype=float)
+
+
 def _least(team: Team, own: Sequence[Sequence[Line]], released: Sequence[Line]) -> float:
     """Return seconds below which nothing can be: all work shared by all, without any way to it."""
     metres = sum(line.length for lines in [*own, released] for line in lines)

@@ -15,18 +15,17 @@ from quarterdeck.geo.transit import Roadmap
 from quarterdeck.mission.changes import Changes
 from quarterdeck.mission.cover import cover, roadmaps, trackable
 from quarterdeck.mission.lines import plan_lines
-from quarterdeck.mission.mission import Layer, Mission, Route, unbroken
+from quarterdeck.mission.mission import Layer, Mission, Route, unbroken, undone
 from quarterdeck.mission.progress import Progress
 from quarterdeck.mission.remaining import clipped, remaining_parts
 from quarterdeck.mission.routes import line_routes, survey_tracks
-from quarterdeck.mission.sharing import Line, Shares, Team, line_of, share_out, team_of
+from quarterdeck.mission.sharing import Line, Shares, Team, line_of, share_out, team_of, times
 from quarterdeck.mission.timing import RESERVE, seconds_out, shortfalls
 
 VISITED = 0.25  # spacings: a survey line is done where a track ran along it so near
 ROUNDS = 2  # of sharing out again, once ways and turns are known
 CUTS = 20  # tries to fit routes into the energy left
 LEFT_OUT = "left out"  # the layer of lines that nobody can do any more
-UNDONE = "undone"  # the layer of areas that they would have covered
 
 
 def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, changes: Changes, *, seed: int) -> Mission:
@@ -83,12 +82,8 @@ def _why(left: Sequence[Line]) -> str:
 def _layers(left: Sequence[np.ndarray], gaps: MultiPolygon, rim: MultiPolygon) -> tuple[Layer, ...]:
     """Return what is not done: the lines, for whoever replans next, and the areas, with why."""
     areas = [(g, why) for g, why in ((gaps, "left out"), (rim, "too near to what is new")) if g.area > 0]
-    look = {"stroke": "#d62728", "fill": "#d62728", "fill-opacity": 0.3}
     lines = Layer(LEFT_OUT, tuple(LineString(line) for line in left), tuple({"stroke": "#d62728"} for _ in left))
-    told = Layer(
-        UNDONE, tuple(g for g, _ in areas), tuple({"why": why, "m2": round(g.area, 3), **look} for g, why in areas)
-    )
-    return tuple(layer for layer in (lines, told) if layer.geometries)
+    return (*((lines,) if left else ()), *((undone(areas),) if areas else ()))
 
 
 class _Access:
@@ -215,12 +210,12 @@ def _shared(
     classes = _classes(scenario.site, own, released, VISITED * crumb)
     best: _Survey | None = None
     for _ in range(1 + ROUNDS):
-        shares = _by_priority(team_of(vehicles, paces, spent, limits), classes, crumb)
-        survey = _affordable(vehicles, shares, roads, paces)
+        team = team_of(vehicles, paces, spent, limits)
+        survey, lines = _affordable(vehicles, _by_priority(team, classes, crumb), roads, paces)
         if best is not None and survey.merit >= best.merit:
             break
         best = survey
-        spent = spent + np.array([r.duration for r in survey.routes]) - shares.times
+        spent = spent + np.array([r.duration for r in survey.routes]) - times(team, lines)
     assert best is not None
     return best
 
@@ -274,8 +269,10 @@ def _by_priority(team: Team, classes: Sequence[tuple[list[list[Line]], list[Line
     return Shares(lines, shares.times, left)
 
 
-def _affordable(vehicles: Sequence[Vehicle], shares: Shares, roads: Sequence[Roadmap], paces: np.ndarray) -> _Survey:
-    """Return the routes along lines, each cut at its end until its vehicle has the energy and time for it."""
+def _affordable(
+    vehicles: Sequence[Vehicle], shares: Shares, roads: Sequence[Roadmap], paces: np.ndarray
+) -> tuple[_Survey, list[list[Line]]]:
+    """Return the routes along lines, each cut at its end until its vehicle has the energy for it; and the lines."""
     lines, left = [list(own) for own in shares.lines], list(shares.left)
     for attempt in range(CUTS):
         routes, reasons = line_routes(vehicles, [[x.points for x in own] for own in lines], roads)
@@ -285,7 +282,7 @@ def _affordable(vehicles: Sequence[Vehicle], shares: Shares, roads: Sequence[Roa
         for i in poor:
             metres = _excess(vehicles[i], routes[i]) / paces[i] if attempt < CUTS - 2 else np.inf
             left += _dropped(lines[i], metres)
-    return _Survey(routes, tuple(reasons), left)
+    return _Survey(routes, tuple(reasons), left), lines
 
 
 def _excess(vehicle: Vehicle, route: Route) -> float:
