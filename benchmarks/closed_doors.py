@@ -10,7 +10,7 @@ three crates. A task is reachable if a robot can get to it by the doors that are
 import argparse
 import json
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -128,7 +128,8 @@ def main() -> None:
         if options.picture:
             from quarterdeck.exporters.picture import picture
 
-            Path(options.picture).write_bytes(picture(mission, run.trace, run.report))
+            there = replace(mission, site=run.site or mission.site)
+            Path(options.picture).write_bytes(picture(there, run.trace, run.report, strange=b.closed))
     told = np.array(figures).sum(axis=0).tolist()
     names = ("reachable", "reachable_served", "served_though_not_reachable", "collisions", "untold", "tasks")
     seconds = round(time.process_time() - began, 1)

@@ -11,7 +11,7 @@ from quarterdeck.geo.palette import SITE
 from quarterdeck.mission.mission import Mission, Route
 from quarterdeck.physics.report import Report
 
-WATER, AREA, OBSTACLE, MISSED = "#f4f7fa", "#dcebf5", "#8c8c8c", "#d7191c"
+WATER, AREA, OBSTACLE, MISSED, STRANGE = "#f4f7fa", "#dcebf5", "#8c8c8c", "#d7191c", "#111111"
 TASK: dict[str, Any] = {"marker": "s", "color": "black", "markerfacecolor": "#ffffb2", "markersize": 4, "linestyle": "none"}
 START: dict[str, Any] = {"marker": "o", "color": "white", "markeredgecolor": "black", "linestyle": "none"}
 CONTACT: dict[str, Any] = {
@@ -89,7 +89,7 @@ def _row(panel: Axes, y: float, size: float, texts: tuple[str, ...], *, weight: 
         panel.text(x, y, text, fontsize=size, ha=side, va="center", weight=weight, parse_math=False)
 
 
-def legend(panel: Axes, mission: Mission, *, run: bool = False) -> None:
+def legend(panel: Axes, mission: Mission, *, run: bool = False, strange: bool = False) -> None:
     """Say what the map's lines and fills are."""
     handles: list[Any] = [
         Line2D([], [], color="#333333", linewidth=1.8, label="survey"),
@@ -100,6 +100,8 @@ def legend(panel: Axes, mission: Mission, *, run: bool = False) -> None:
     ]
     if mission.site.obstacles:
         handles.append(Patch(facecolor=OBSTACLE, edgecolor=SITE["obstacle"], label="obstacle"))
+    if strange:
+        handles.append(Patch(facecolor=STRANGE, edgecolor=STRANGE, label="obstacle that the plan did not know"))
     if mission.tasks:
         handles.append(Line2D([], [], **TASK, label="task"))
     if run:

@@ -1,6 +1,7 @@
 """A map of a plan as PNG, and of a run over its plan: what an operator checks before and after."""
 
 import io
+from collections.abc import Sequence
 
 import numpy as np
 import shapely
@@ -11,9 +12,10 @@ from matplotlib.figure import Figure
 
 from quarterdeck.exporters.export import Settings
 from quarterdeck.exporters.map_furniture import fill, graticule, north_arrow, scale_bar
-from quarterdeck.exporters.map_panel import AREA, CONTACT, MISSED, OBSTACLE, START, TASK, WATER, legend, table
+from quarterdeck.exporters.map_panel import AREA, CONTACT, MISSED, OBSTACLE, START, STRANGE, TASK, WATER, legend, table
 from quarterdeck.exporters.places import file_stems
 from quarterdeck.geo.palette import CASUALTY, SITE, colours
+from quarterdeck.geo.scenario import Obstacle
 from quarterdeck.mission.mission import Mission
 from quarterdeck.physics.report import Report
 from quarterdeck.physics.swath import driven_tracks, planned_tracks
@@ -26,13 +28,19 @@ def files(mission: Mission, settings: Settings) -> dict[str, bytes]:  # noqa: AR
 
 
 def picture(
-    mission: Mission, trace: Trace | None = None, report: Report | None = None, *, width: int = 1800, height: int = 1200
+    mission: Mission,
+    trace: Trace | None = None,
+    report: Report | None = None,
+    *,
+    strange: Sequence[Obstacle] = (),
+    width: int = 1800,
+    height: int = 1200,
 ) -> bytes:
     """Return a PNG of the plan, or with a `trace` of the run over the plan, `width` by `height` pixels.
 
     North (of the frame's centre) is up. Survey legs are thick, transits thin, starts are numbered as in the table. Of a run
     the driven tracks, what they missed of the plan's swaths, and contacts are drawn; with its `report` the table holds the
-    run's figures and the caption the verdict.
+    run's figures and the caption the verdict. Of the site's obstacles, `strange` are those that the plan did not know.
     """
     figure = Figure(figsize=(width / 150, height / 150), dpi=150, facecolor="white")
     FigureCanvasAgg(figure)
@@ -40,7 +48,7 @@ def picture(
     panel = figure.add_axes((0.685, 0.03, 0.30, 0.90))
     palette = colours(len(mission.routes))
     _view(chart, mission, width / height)
-    _site(chart, mission)
+    _site(chart, mission, strange)
     _layers(chart, mission, palette)
     _routes(chart, mission, palette, faint=trace is not None)
     if trace is not None:
@@ -52,7 +60,7 @@ def picture(
     figure.text(0.055, 0.955, mission.name, fontsize=13, weight="bold", va="center", parse_math=False)
     figure.text(0.67, 0.955, _caption(mission, report), fontsize=8, va="center", ha="right", color="#333333")
     table(panel, mission, palette, report)
-    legend(panel, mission, run=trace is not None)
+    legend(panel, mission, run=trace is not None, strange=bool(strange))
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None})
     return buffer.getvalue()
@@ -77,7 +85,7 @@ def _view(chart: Axes, mission: Mission, aspect: float) -> None:
     chart.set_facecolor("#e9ecef")
 
 
-def _site(chart: Axes, mission: Mission) -> None:
+def _site(chart: Axes, mission: Mission, strange: Sequence[Obstacle]) -> None:
     site = mission.site
     fill(
         chart, site.operating, facecolor=WATER, edgecolor=SITE["operating"], linewidth=0.8, linestyle=(0, (5, 3)), zorder=1
@@ -86,6 +94,9 @@ def _site(chart: Axes, mission: Mission) -> None:
         fill(chart, area.polygon, facecolor=AREA, edgecolor=SITE["area"], linewidth=0.7, zorder=2)
     for obstacle in site.obstacles:
         solid = bool(obstacle.blocks)
+        if obstacle in strange:
+            fill(chart, obstacle.polygon, facecolor=STRANGE, edgecolor=STRANGE, linewidth=1.0, zorder=3)
+            continue
         fill(
             chart,
             obstacle.polygon,

@@ -32,13 +32,15 @@ class Occupancy:
     """A grid of cells of side `resolution` metres. `cells` (rows, cols) int8: FREE, OCCUPIED or UNKNOWN.
 
     `origin` is the (x, y) metres of the outer corner of cell (0, 0), `yaw` the radians by which the grid is turned about
-    it, counter-clockwise; columns run along its x axis, rows along its y axis (upwards: unlike a picture's).
+    it, counter-clockwise; columns run along its x axis, rows along its y axis (upwards: unlike a picture's). `place` is
+    the (lon, lat) degrees of (0, 0) metres, where that is known.
     """
 
     cells: np.ndarray
     resolution: float
     origin: tuple[float, float] = (0.0, 0.0)
     yaw: float = 0.0
+    place: tuple[float, float] | None = None
 
     def to_cells(self, xy: np.ndarray) -> np.ndarray:
         """Return (n, 2) rows and columns, as real numbers, of (n, 2) metres; cell (i, j) spans i..i + 1 and j..j + 1."""
@@ -90,7 +92,8 @@ def site_occupancy(site: Site, domain: str, resolution: float, margin: float = 0
 def read_map(source: str | Path) -> Occupancy:
     """Return the map in a map_server .yaml file and its image (.pgm, .png), in metres of the map's own frame.
 
-    Cells at or between the thresholds are UNKNOWN. Raises InputError if either file cannot be read or a figure is missing.
+    Cells at or between the thresholds are UNKNOWN. Its place is that of `geo_origin`, a key of ours that map_server passes
+    over. Raises InputError if either file cannot be read or a figure is missing.
     """
     path = Path(source)
     try:
@@ -114,6 +117,9 @@ def read_map(source: str | Path) -> Occupancy:
         raise InputError(f"{path}: origin must be [x, y, yaw], not {_short(origin)}")
     if document.get("mode", "trinary") not in ("trinary", "scale"):
         raise InputError(f"{path}: mode {_short(document['mode'])} is not known; use trinary or scale")
+    place = document.get("geo_origin")
+    if place is not None and not (isinstance(place, list) and len(place) == 2 and all(_is_number(v) for v in place)):
+        raise InputError(f"{path}: geo_origin must be [longitude, latitude], not {_short(place)}")
     picture = path.parent / document["image"]
     try:
         with warnings.catch_warnings(action="ignore"), Image.open(picture) as image:
@@ -128,7 +134,8 @@ def read_map(source: str | Path) -> Occupancy:
     cells = np.full(grey.shape, UNKNOWN, np.int8)
     cells[darkness > occupied] = OCCUPIED
     cells[darkness < free] = FREE
-    return Occupancy(cells[::-1].copy(), resolution, (float(origin[0]), float(origin[1])), float(origin[2]))
+    at = None if place is None else (float(place[0]), float(place[1]))
+    return Occupancy(cells[::-1].copy(), resolution, (float(origin[0]), float(origin[1])), float(origin[2]), at)
 
 
 def write_map(occupancy: Occupancy, path: Path, *, force: bool = False) -> Path:
@@ -153,6 +160,8 @@ def write_map(occupancy: Occupancy, path: Path, *, force: bool = False) -> Path:
         "occupied_thresh": 0.65,
         "free_thresh": 0.196,
     }
+    if occupancy.place is not None:
+        document["geo_origin"] = [float(v) for v in occupancy.place]
     # PyYAML's own numbers: 1e-12 would be read back as a text, 1.0e-12 is not.
     text = yaml.safe_dump(document, sort_keys=False, default_flow_style=None)
     write_files({picture: buffer.getvalue(), path: text}, force=force)

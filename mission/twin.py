@@ -19,11 +19,12 @@ def map_scenario(
 ) -> tuple[Scenario, Occupancy]:
     """Return the scenario on the map in a map_server .yaml file, and the map in the scenario's frame.
 
-    `origin` is the (lon, lat) degrees of the map's (0, 0), default the frame's; the map's axes point east and north. What
-    the map does not show as free becomes obstacles for vehicles on the ground and at sea. Raises InputError if a vehicle
-    or task lies outside the map.
+    `origin` is the (lon, lat) degrees of the map's (0, 0), default what the map says, else the frame's; the map's axes
+    point east and north. What the map does not show as free becomes obstacles for vehicles on the ground and at sea. Raises
+    InputError if a vehicle or task lies outside the map.
     """
     twin = read_map(source)
+    origin = origin or twin.place
     if origin is not None:
         x, y = scenario.frame.to_metres(np.array([origin]))[0]
         twin = twin.shifted(float(x), float(y))

@@ -61,9 +61,9 @@ def fuse(evidence: Evidence, pose: np.ndarray, angles: np.ndarray, ranges: np.nd
 def agreement(made: Occupancy, site: Site) -> dict[str, float]:
     """Return how well a map tells of a site's ground, in the operating area.
 
-    `free_iou`: cells free in both over cells free in either, of those that the map knows of; `walls_right`: the part of
-    the map's occupied cells that lie within a cell and a half of an obstacle's edge; `known`: the part of the free cells
-    that the map knows of.
+    `map_known`: the part of the free cells of which the map knows; `map_free_iou`: of those that it knows, cells free in
+    both over cells free in either; `map_walls_right`: the part of its occupied cells that lie within a cell and a half of
+    an obstacle's edge.
     """
     centres = made.to_metres(np.indices(made.cells.shape).reshape(2, -1).T + 0.5)
     on = shapely.contains_xy(_prepared(site.operating), *centres.T)
@@ -72,10 +72,11 @@ def agreement(made: Occupancy, site: Site) -> dict[str, float]:
     real = ~shapely.contains_xy(_prepared(solid), *centres.T)
     known, walls = ours != UNKNOWN, shapely.points(centres[ours == OCCUPIED])
     both, either = np.count_nonzero((ours == FREE) & real), np.count_nonzero(known & ((ours == FREE) | real))
+    right = shapely.dwithin(walls, solid.boundary, 1.5 * made.resolution)
     return {
-        "free_iou": both / either if either else 0.0,
-        "walls_right": float(shapely.dwithin(walls, solid.boundary, 1.5 * made.resolution).mean()) if len(walls) else 1.0,
-        "known": float(known[real].mean()) if real.any() else 1.0,
+        "map_free_iou": both / either if either else 0.0,
+        "map_walls_right": float(right.mean()) if len(walls) else 1.0,
+        "map_known": float(known[real].mean()) if real.any() else 1.0,
     }
 
 

@@ -8,6 +8,8 @@ import numpy as np
 
 from quarterdeck.geo.deadline import cause, time_is_up
 from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.occupancy import Occupancy
+from quarterdeck.geo.scenario import Site
 from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.director import Director
 from quarterdeck.mission.inspection import default_director
@@ -15,6 +17,7 @@ from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.recovery import undone
 from quarterdeck.mission.triage.plan import METHOD
 from quarterdeck.physics.faults import read_faults
+from quarterdeck.physics.mapping import agreement
 from quarterdeck.physics.report import Report, measure
 from quarterdeck.physics.running import DECIDE, Running
 from quarterdeck.physics.sensing import Sensing
@@ -34,6 +37,8 @@ class Run:
     trace: Trace
     report: Report
     triage: Compared | None = None  # of a triage mission: what became of its casualties
+    site: Site | None = None  # what was there
+    map: Occupancy | None = None  # what robots that drew a map made of it
 
 
 def simulate(
@@ -121,6 +126,7 @@ def simulate(
         "amcl": sensing.amcl,
         "field": sensing.field,
         "terrain": None if terrain is None else [*terrain.origin, terrain.cell, *terrain.heights.shape],
+        "mapping": sensing.mapping,
         "unmapped": [o.id for o in sensing.unmapped],
         "world": None if sensing.world is None else [o.id for o in sensing.world],
     }
@@ -139,7 +145,11 @@ def simulate(
         servers=run.servers,
         undone=undone(run.memory),
     )
-    return Run(trace, report, compared)
+    made = None
+    if sensing.mapping and run.router is not None:
+        made = replace(run.router.shared.occupancy(), place=(mission.frame.lon, mission.frame.lat))
+        report = replace(report, figures={**report.figures, **agreement(made, mission.site)})
+    return Run(trace, report, compared, mission.site, made)
 
 
 def _check(

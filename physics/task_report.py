@@ -8,7 +8,8 @@ import numpy as np
 from quarterdeck.mission.mission import Mission
 from quarterdeck.physics.trace import Trace
 
-STANDS = 0.5  # m: a vehicle that moves less has stayed where it is
+BEAT = 1.0  # s: how exactly it is known when a task was done
+STANDS = 0.15  # m: a vehicle that moves less has stayed where it is
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +56,8 @@ def task_reports(
             vehicle, leave = servers[task.id], served[task.id]
             begin = max(leave - task.service_time, 0.0)
             arrival = min(_came(trace, trace.vehicles.index(vehicle), leave), begin)
+            if begin - arrival <= BEAT:
+                begin, leave = arrival, arrival + task.service_time
             drive = Service(vehicle, arrival, begin, leave, begin - arrival)
         why = [line.removeprefix(f"task {task.id!r}: ") for line in undone if line.startswith(f"task {task.id!r}: ")]
         reason = "" if task.id in served else why[-1] if why else "nobody came to it before the run ended"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,7 +65,11 @@ class PriorityFunction(click.ParamType):
 @click.option(
     "--map", "map_file", metavar="FILE.yaml", help="Drive on this ROS map_server map, not on the site's polygons."
 )
-@click.option("--map-origin", type=Numbers("LON,LAT", 2), help="Where the map's (0, 0) lies; default the site's centre.")
+@click.option(
+    "--map-origin",
+    type=Numbers("LON,LAT", 2),
+    help="Where the map's (0, 0) lies; default what the map says, else the site's centre.",
+)
 @click.option(
     "--write-map",
     metavar="FILE.yaml",
@@ -133,7 +138,8 @@ def _write_map(scenario: Scenario, path: Path, resolution: float | None, *, forc
     from quarterdeck.geo.occupancy import site_occupancy, write_map
     from quarterdeck.mission.travel import default_resolution
 
-    write_map(site_occupancy(scenario.site, "ground", resolution or default_resolution(scenario)), path, force=force)
+    made = site_occupancy(scenario.site, "ground", resolution or default_resolution(scenario))
+    write_map(replace(made, place=(scenario.frame.lon, scenario.frame.lat)), path, force=force)
 
 
 def _print(mission: Mission) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
@@ -23,16 +24,17 @@ from quarterdeck.cli.parameters import Choice, Real
 from quarterdeck.geo.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from rich.console import Console
 
     from quarterdeck.mission.mission import Mission
     from quarterdeck.physics.report import Report
     from quarterdeck.physics.simulate import Run
+    from quarterdeck.physics.task_report import TaskReport
 
 
-FILES = ("plan", "unmapped", "terrain")  # the options that are files to read
+FILES = ("plan", "unmapped", "world", "terrain")  # the options that are files to read
 
 
 class Vector(click.ParamType):
@@ -103,6 +105,11 @@ class Limit(click.ParamType):
     help="The potential field of robots with lidar: scaled by the goal's distance, or the inspection paper's.",
 )
 @click.option("--unmapped", metavar="SITE", help="GeoJSON with obstacles that are there, but that the plan does not know.")
+@click.option("--world", metavar="SITE", help="GeoJSON with the obstacles that are there, in place of the plan's.")
+@click.option(
+    "--map", "map_file", metavar="FILE.yaml", callback=not_there,
+    help="Write the map that the robots draw by lidar, for map_server, .yaml and .pgm (implies --lidar).",
+)  # fmt: skip
 @click.option(
     "--terrain", metavar="FILE", help="Ground that is not flat: an ESRI ASCII grid, or NPZ. See docs/simulation.md."
 )
@@ -134,6 +141,10 @@ def command(
 
     with limited(time_limit, interruptible=True) as limit:
         mission, run = execute(**options)
+    if run.map is not None:
+        from quarterdeck.geo.occupancy import write_map
+
+        write_map(run.map, Path(options["map_file"]), force=force)
     if trace:
         emit(run.trace.to_bytes(mission.frame), trace, force=force)
     if report or as_json:
@@ -149,7 +160,10 @@ def command(
     if picture:
         from quarterdeck.exporters.picture import picture as draw
 
-        emit(draw(mission, run.trace, run.report), picture, force=force)
+        there = mission if run.site is None else replace(mission, site=run.site)
+        known = {o.id for o in mission.site.obstacles}
+        strange = () if options["world"] else tuple(o for o in there.site.obstacles if o.id not in known)
+        emit(draw(there, run.trace, run.report, strange=strange), picture, force=force)
     if snapshots or casualties:
         if run.triage is None:
             raise InputError("--snapshots and --casualties are for plans of triage; use --picture and --report")
@@ -182,6 +196,8 @@ def execute(
     amcl: bool,
     field: Literal["scaled", "paper"],
     unmapped: str | None,
+    world: str | None = None,
+    map_file: str | None = None,
     terrain: str | None,
     seed: int,
     limits: tuple[tuple[str, float], ...],
@@ -200,7 +216,9 @@ def execute(
     mission = read_plan(plan)
     strange = read_obstacles(unmapped, mission.frame) if unmapped else ()
     ground = read_terrain(terrain, mission.frame, mission.site.operating.bounds) if terrain else None
-    sensing = Sensing(gnss=gnss, lidar=lidar, amcl=amcl, unmapped=strange, field=field)
+    there = read_obstacles(world, mission.frame) if world else None
+    mapping = map_file is not None
+    sensing = Sensing(gnss, lidar or mapping, amcl, strange, there, mapping, field)
     with _progress(mission.name) as progress:
         run = simulate(
             mission,
@@ -268,6 +286,8 @@ def print_report(mission: Mission, report: Report, *, how: str = "simulated") ->
             _metres(v.separation),
         )
     screen.print(table)
+    if report.tasks:
+        _print_tasks(screen, report.tasks)
     figures = report.figures
     words = [f"off track {figures['legs_p95']:.2f} m (95 %, straight legs)"]
     if figures["coverage_planned"] is not None:
@@ -280,6 +300,11 @@ def print_report(mission: Mission, report: Report, *, how: str = "simulated") ->
         words.append(f"lost {figures['lost']}")
     if figures["localisation_p95"] is not None:
         words.append(f"localised to {figures['localisation_p95']:.2f} m (95 %, worst vehicle)")
+    if figures.get("map_known") is not None:
+        words.append(
+            f"map: {figures['map_known']:.1%} of the free ground known, {figures['map_free_iou']:.1%} of it right (IoU), "
+            f"{figures['map_walls_right']:.1%} of the walls"
+        )
     screen.print("; ".join(words))
     for note in report.notes:
         print_reason(screen, "note", note)
@@ -303,6 +328,28 @@ def _print_triage(screen: Console, triage: Mapping[str, Any]) -> None:
         table.add_column(column, justify="right" if column else "left")
     for name, (label, form) in ROWS.items():
         table.add_row(label, *("-" if value is None else form.format(value) for value in triage["figures"][name]))
+    screen.print(table)
+
+
+def _print_tasks(screen: Console, tasks: Sequence[TaskReport]) -> None:
+    """Print when tasks were to be done and when they were."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    table = Table(title="tasks, as planned in brackets", title_justify="left", box=SIMPLE_HEAD)
+    for column in ("task", "vehicle", "came", "began", "left", "waited"):
+        table.add_column(column, justify="left" if column in ("task", "vehicle") else "right", no_wrap=True)
+    for task in tasks[:60]:
+        plan, drive = task.planned, task.driven
+        who = drive.vehicle if drive else "-"
+        pairs = [
+            f"{minutes(getattr(drive, name)).removeprefix('0:') if drive else '-'} "
+            f"({minutes(getattr(plan, name)).removeprefix('0:') if plan else '-'})"
+            for name in ("arrival", "begin", "leave")
+        ]
+        waits = f"{drive.waited:.0f} s" if drive else "-"
+        table.add_row(task.id, who if plan and who == plan.vehicle else f"{who} ({plan.vehicle if plan else '-'})", *pairs,
+                      f"{waits} ({f'{plan.waited:.0f} s' if plan else '-'})")  # fmt: skip
     screen.print(table)
 
 

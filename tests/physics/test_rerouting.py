@@ -1,0 +1,143 @@
+"""Inspection live: doors that are closed are found, driven around, told; what can be reached is served, in order."""
+
+import runpy
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from shapely import MultiPolygon, box
+
+from quarterdeck.geo.frame import Frame
+from quarterdeck.geo.models import load_model
+from quarterdeck.geo.scenario import Obstacle, Precedence, Scenario, Site, Task, Vehicle
+from quarterdeck.mission.assign import assign
+from quarterdeck.mission.recovery import recovering
+from quarterdeck.physics.lidar import beam_angles, cast, edge_grid
+from quarterdeck.physics.rerouting import Rerouting
+from quarterdeck.physics.sensing import Sensing
+from quarterdeck.physics.simulate import simulate
+
+pytest.importorskip("pybullet", reason="PyBullet has wheels for Linux and CPython 3.11 only")
+DOORS = SimpleNamespace(**runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "closed_doors.py")))
+
+
+@cache
+def driven(seed, amcl=False):
+    """Return a building of the benchmark, its plan and its run."""
+    b = DOORS.building(seed)
+    return (b, *DOORS.drive(b, amcl=amcl, seed=seed))
+
+
+@pytest.mark.parametrize(("seed", "amcl"), [(0, True), (9, False), (14, False)])
+def test_what_can_be_reached_is_served_in_order_and_the_rest_is_told(seed, amcl):
+    """With a third of the doors closed: no collision, every reachable task served, no task before its predecessors."""
+    b, mission, run = driven(seed, amcl)
+    can = DOORS.reachable(b)
+    assert len(can) < len(mission.tasks)
+    assert not run.report.figures["collisions"]
+    done = {t.id: t.driven for t in run.report.tasks if t.driven}
+    assert set(done) == can
+    for task in mission.tasks:
+        if task.id in done:
+            for before in task.after:
+                assert done[before.task].leave <= done[task.id].begin + 1.0
+        else:
+            told = next(t.reason for t in run.report.tasks if t.id == task.id)
+            assert "no way" in told or "comes after" in told
+    assert all(v.finished for v in run.report.vehicles)
+
+
+def test_the_same_seed_is_the_same_run_to_the_last_digit():
+    """Replans, maps and particles and all."""
+    _, _, run = driven(0, True)
+    b = DOORS.building(0)
+    again = DOORS.drive(b, amcl=True, seed=0)[1]
+    assert again.report.to_json() == run.report.to_json()
+
+
+def corridor(*tasks, robots=1):
+    """Return a site of two rooms with two doors, (10, 2) and (10, 8), and robots in the western one."""
+    walls = (box(9.9, 0, 10.1, 1), box(9.9, 3, 10.1, 7), box(9.9, 9, 10.1, 10))
+    model = load_model("jackal")
+    vehicles = tuple(
+        Vehicle(f"r{n + 1}", model, (2.0, 2.0 + 3 * n), speed=1.0, clearance=0.45, battery=model.battery)
+        for n in range(robots)
+    )
+    site = Site((), MultiPolygon([box(0, 0, 20, 10)]), tuple(Obstacle(f"w{n}", w) for n, w in enumerate(walls)))
+    return Scenario("rooms", Frame(8.5, 47.4), site, vehicles, tasks)
+
+
+SOUTH, NORTH = Obstacle("south door", box(9.95, 1, 10.05, 3)), Obstacle("north door", box(9.95, 7, 10.05, 9))
+
+
+def test_around_a_closed_door_by_the_other_one():
+    """The planned way goes by the southern door; it is closed, and the robot takes the northern one."""
+    mission = assign(corridor(Task("valve", (15.0, 2.0), service_time=5.0)), iterations=5)
+    run = simulate(mission, sensing=Sensing(lidar=True, unmapped=(SOUTH,)))
+    assert not [r for r in run.report.reasons if "took" not in r]
+    crossing = np.flatnonzero(np.diff(np.sign(run.trace.x[:, 0] - 10.0)))
+    assert (np.abs(run.trace.y[crossing, 0] - 8.0) < 1.0).all()
+    assert run.report.vehicles[0].clearance > 0.05
+    task = run.report.tasks[0]
+    assert task.driven.arrival > task.planned.arrival + 5.0
+    assert task.driven.leave - task.driven.begin == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize("recover", [False, True])
+def test_both_doors_closed_ends_with_the_reason(recover):
+    """What is behind them is told as undone, and what comes after it; what is in front is done; nobody waits for ever."""
+    tasks = (
+        Task("valve", (15.0, 2.0), priority=3),
+        Task("near", (5.0, 5.0)),
+        Task("after", (5.0, 8.0), after=(Precedence("valve"),)),
+    )
+    mission = assign(corridor(*tasks, robots=2), iterations=5)
+    director = recovering(mission) if recover else None
+    run = simulate(mission, director=director, sensing=Sensing(lidar=True, unmapped=(SOUTH, NORTH)))
+    reasons = {t.id: t.reason for t in run.report.tasks}
+    assert reasons["near"] == ""
+    assert "no way" in reasons["valve"]
+    assert "valve" in reasons["after"]
+    assert not run.report.figures["collisions"]
+    assert run.trace.time[-1] < 200
+    assert all(v.finished for v in run.report.vehicles)
+
+
+def test_who_is_shut_in_stays_and_says_so():
+    """The doors close behind a robot that serves in the other room: it is told that there is no way home."""
+    mission = assign(corridor(Task("valve", (15.0, 2.0))), iterations=5)
+    shut = replace(mission, vehicles=tuple(replace(v, start=(17.0, 5.0), end=(2.0, 2.0)) for v in mission.vehicles))
+    run = simulate(
+        assign(replace(corridor(*mission.tasks), vehicles=shut.vehicles), iterations=5),
+        sensing=Sensing(lidar=True, unmapped=(SOUTH, NORTH)),
+    )
+    assert "r1: found no way home" in run.report.reasons
+    assert run.report.tasks[0].driven is not None
+    assert not run.report.vehicles[0].finished
+
+
+def test_a_robot_that_is_not_heard_keeps_what_it_saw_until_it_is():
+    """Its own map has the door, the common one does not, until it is heard again."""
+    scenario = corridor(Task("valve", (15.0, 2.0)), robots=2)
+    real = edge_grid([*(o.polygon for o in scenario.site.obstacles), SOUTH.polygon])
+    router, angles = Rerouting(scenario.site, scenario.vehicles, np.array([0, 1])), beam_angles(180)
+    pose = np.array([[6.0, 2.0, 0.0], [2.0, 9.0, 0.0]])
+    ranges = cast(real, pose, angles, 30.0)
+    ranges[1] = np.inf
+    sure = present = np.ones(2, bool)
+
+    def look(mute):
+        for _ in range(3):
+            router.look(pose, sure, angles, ranges, 30.0, np.array([mute, False]), present)
+
+    look(True)
+    assert len(router.found(0)) > 5
+    assert not len(router.found(1))
+    ranges[:] = np.inf
+    look(False)
+    assert len(router.found(1)) > 5
+    assert np.allclose(router.found(1)[:, 0], 10.0, atol=0.2)
+    assert not len(Rerouting(scenario.site, scenario.vehicles, np.array([0])).found(0))
