@@ -42,7 +42,7 @@ def task_reports(
     """Return a report for each task of a mission, in its order.
 
     `served` are the seconds at which tasks were done, `servers` by which vehicles; `undone` lines that say why others were
-    not, `task 'ID': REASON` each.
+    not, `task 'ID' ...: REASON` each.
     """
     planned = {w.task: (r.vehicle, w) for r in mission.routes for w in r.waypoints if w.task is not None}
     out = []
@@ -59,7 +59,7 @@ def task_reports(
             if begin - arrival <= BEAT:
                 begin, leave = arrival, arrival + task.service_time
             drive = Service(vehicle, arrival, begin, leave, begin - arrival)
-        why = [line.removeprefix(f"task {task.id!r}: ") for line in undone if line.startswith(f"task {task.id!r}: ")]
+        why = [line.split(": ", 1)[1] for line in undone if line.startswith((f"task {task.id!r}:", f"task {task.id!r} "))]
         reason = "" if task.id in served else why[-1] if why else "nobody came to it before the run ended"
         out.append(TaskReport(task.id, plan, drive, reason))
     return tuple(out)
