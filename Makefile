@@ -3,8 +3,9 @@ export PYTHONSAFEPATH = 1
 VENV ?= .venv
 BIN = $(VENV)/bin
 OUT ?= out
+LOWEST ?= tests/geo tests/coverage tests/exporters tests/mission/test_planfile.py tests/mission/test_cover.py tests/physics/test_simulate.py
 
-.PHONY: demo test lint bench bench-coverage bench-physics bench-assign bench-triage soak docs clean
+.PHONY: demo test lint bench bench-coverage bench-physics bench-assign bench-triage soak docs docs-pictures docs-site lowest clean
 
 $(VENV)/installed: pyproject.toml
 	python3 -m venv $(VENV)
@@ -44,8 +45,17 @@ bench-triage: $(VENV)/installed
 soak: $(VENV)/installed  ## damaged input by the hundred thousand: hours
 	$(BIN)/python -m pytest tests/soak --soak 50000
 
-docs: $(VENV)/installed  ## what is generated in docs/: the format of sites
+docs: $(VENV)/installed  ## the pages that are generated: a minute or two
 	$(BIN)/python docs/generate.py
+
+docs-pictures: $(VENV)/installed  ## the pictures of the pages, but those that the tutorials' own commands make
+	$(BIN)/python docs/draw.py
+
+docs-site: $(VENV)/installed  ## docs/ as a site in out/site
+	$(BIN)/python -m mkdocs build --strict
+
+lowest:  ## tests on the lowest versions that pyproject.toml allows, in an environment of its own
+	.ci/lowest .venv-lowest -q $(LOWEST)
 
 clean:
 	rm -rf $(VENV) $(OUT) build dist *.egg-info

@@ -1,8 +1,9 @@
-"""Write what is generated, `make docs` runs it: geojson.md, triage-machines.md, reproduce.md and geo/site.schema.json."""
+"""Write what is generated, `make docs` runs it: the format, vehicles, state machines, reproductions, the JSON Schema."""
 
 import json
 from pathlib import Path
 
+from quarterdeck.geo.models import DEFAULT_MODEL, load_model, model_names
 from quarterdeck.geo.properties import GEOMETRIES, PROPERTIES, json_schema
 from quarterdeck.mission.triage.machines import MACHINES, as_markdown
 from quarterdeck.reproduce.all import PAPERS, section
@@ -76,6 +77,66 @@ def machines_page() -> str:
     return "\n".join([head, made, *(as_markdown(kind) for kind in MACHINES)])
 
 
+VEHICLES = """# Vehicle files
+
+A vehicle's model is a TOML file. These ship with the package, in `data/vehicles/`; the table is made of them by `make
+docs`. A site names one, `"model": "otter"`, or the path of your own, `"model": "our_boat.toml"`; its domain's default is
+the one in bold. [How to make your own](extending.md).
+
+| model | domain | length m | cruise m/s | most m/s | turn radius m | clearance m | battery Wh | source |
+|---|---|---|---|---|---|---|---|---|
+"""
+
+VEHICLE_FIGURES = """
+## What a file has
+
+`name`, `domain` (`surface`, `ground`, `aerial`) and `source`, a text that says where the figures are from; then three
+tables.
+
+| `[limits]` | unit | planners |
+|---|---|---|
+| `length`, `width` | m | keep other vehicles clear of the hull |
+| `speed`, `max_speed` | m/s | cruise at the one; never beyond the other |
+| `turn_radius` | m | round corners by it at cruise; 0: stop and turn on the spot |
+| `turn_rate` | rad/s | count the time of turns on the spot |
+| `acceleration` | m/s2 | count the time of starting and stopping |
+| `clearance` | m | keep it from obstacles and the fence |
+| `climb_rate`, `descent_rate` | m/s | aerial: count climbing and landing |
+| `altitude` | m | aerial: fly so high above ground where the site says nothing |
+
+| `[energy]` | unit | meaning |
+|---|---|---|
+| `battery` | Wh | of which a reserve is kept |
+| `power_idle` | W | at rest, or hovering |
+| `power_cruise` | W | at cruise speed in calm water or air |
+| `power_exponent` | - | how the difference of the two grows with speed |
+
+`[dynamics]` is what [the simulation](simulation.md) integrates; each domain has its own figures, named with their units
+in the packaged files: masses, damping and propellers of a vessel; wheels, slip and lag of a rover; rotors, drag and the
+attitude loop of a multirotor. A figure that lacks, or is no number, is refused in one line that names it.
+
+A site may override `speed`, `turn_radius`, `clearance`, `battery`, `endurance` and `altitude` for one vehicle: see
+[the format](geojson.md).
+
+## Where it fails
+
+- Power depends on speed alone: a planned route knows no current, wind or payload; the simulation counts them by thrust.
+- Limits and dynamics are two statements about one vehicle. Nothing forces them to agree but the simulation's verdict; for
+  the packaged models the tests hold them together.
+"""
+
+
+def vehicles_page() -> str:
+    """Return docs/vehicles.md."""
+    rows = []
+    for name in model_names():
+        m = load_model(name)
+        shown = f"**{name}**" if name in DEFAULT_MODEL.values() else name
+        figures = (m.length, m.speed, m.max_speed, m.turn_radius, m.clearance, m.battery)
+        rows.append(f"| {shown} | {m.domain} | {' | '.join(f'{v:g}' for v in figures)} | {m.source} |")
+    return VEHICLES + "\n".join(rows) + "\n" + VEHICLE_FIGURES
+
+
 REPRODUCTION = """# The papers' tables beside ours
 
 Made by `make docs` of what `quarterdeck reproduce all` prints, in about a minute. Each part stands under the command that
@@ -101,5 +162,6 @@ def schema_text() -> str:
 if __name__ == "__main__":
     (ROOT / "docs" / "geojson.md").write_text(geojson_page(), encoding="utf-8")
     (ROOT / "docs" / "triage-machines.md").write_text(machines_page(), encoding="utf-8")
+    (ROOT / "docs" / "vehicles.md").write_text(vehicles_page(), encoding="utf-8")
     (ROOT / "docs" / "reproduce.md").write_text(reproduction_page(), encoding="utf-8")
     (ROOT / "geo" / "site.schema.json").write_text(schema_text(), encoding="utf-8")

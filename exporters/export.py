@@ -5,14 +5,17 @@ writes nothing. So an export is whole or not at all: every file is made and ever
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from difflib import get_close_matches
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
 
+from quarterdeck.geo import addons
+from quarterdeck.geo.addons import addon, addon_names
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.files import write_files
 from quarterdeck.geo.terrain import Terrain
@@ -123,9 +126,7 @@ def export(
     for within, part in _parts(mission, split, terrain, tolerance):
         _check(part, names, settings, unsafe=unsafe)
         for name in dict.fromkeys(names):
-            module, options, _ = _format(name)
-            exporter = import_module(f"quarterdeck.exporters.{module}")
-            for file, content in exporter.files(part, settings, **options).items():
+            for file, content in _exporter(name)(part, settings).items():
                 if within + file in made:
                     raise InputError(f"{name} and another of the formats both write {file}; export them one by one")
                 made[within + file] = content
@@ -169,9 +170,14 @@ def _more(problems: Sequence[str]) -> str:
     return f" (and {len(problems) - 1} more: `quarterdeck check` lists them)" if len(problems) > 1 else ""
 
 
-def _format(name: str) -> tuple[str, dict[str, Any], str]:
-    if name not in FORMATS:
-        near = get_close_matches(name, FORMATS, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(sorted(FORMATS))}"
-        raise InputError(f"unknown format {name!r}; {hint}")
-    return FORMATS[name]
+def _exporter(name: str) -> Callable[[Mission, Settings], Mapping[str, bytes | str]]:
+    """Return the function that makes a format's files, ours or a package's that the user has installed."""
+    if name in FORMATS:
+        module, options, _ = FORMATS[name]
+        return partial(import_module(f"quarterdeck.exporters.{module}").files, **options)
+    added = addon_names(addons.FORMATS)
+    if name in added:
+        return addon(addons.FORMATS, name)
+    near = get_close_matches(name, [*FORMATS, *added], n=1)
+    hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(sorted([*FORMATS, *added]))}"
+    raise InputError(f"unknown format {name!r}; {hint}")

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+from quarterdeck.geo.addons import METHODS, addon, addon_names
 from quarterdeck.geo.deadline import limited
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.reader import read_scenario
@@ -25,7 +26,7 @@ Method = Literal["stc", "lines", "guards"]
 def plan(
     scenario: Scenario,
     *,
-    method: Method | None = None,
+    method: Method | str | None = None,
     seed: int = 0,
     terrain: Terrain | None = None,
     tolerance: float = 5.0,
@@ -36,19 +37,18 @@ def plan(
 
     `stc` divides a placed grid and walks spanning trees (`quarterdeck.mission.cover.cover`), `lines` surveys by parallel
     lines (`quarterdeck.mission.lines.plan_lines`), `guards` sees every point from within a limited range
-    (`quarterdeck.mission.guards.plan_guards`); `options` are theirs. None: lines where a vehicle has a sensor, else stc.
+    (`quarterdeck.mission.guards.plan_guards`); packages may add methods (docs/extending.md); `options` are theirs. None:
+    lines where a vehicle has a sensor, else stc.
     Over `terrain` what flies holds its height above ground within `tolerance` metres (`quarterdeck.mission.follow.follow`).
     After `time_limit` seconds searches end with the best so far, which the mission's header tells.
     Raises InputError if the scenario cannot be planned as it is.
     """
     method = method or default_method(scenario)
-    if method not in get_args(Method):
-        raise InputError(f"unknown method {method!r}; use one of {', '.join(get_args(Method))}")
     planner = _planner(method)
     return _at_height(within(time_limit, lambda: planner(scenario, seed=seed, **options)), terrain, tolerance)
 
 
-def _planner(method: Method) -> Callable[..., Mission]:
+def _planner(method: str) -> Callable[..., Mission]:
     if method == "guards":
         from quarterdeck.mission.guards import plan_guards
 
@@ -57,9 +57,14 @@ def _planner(method: Method) -> Callable[..., Mission]:
         from quarterdeck.mission.lines import plan_lines
 
         return plan_lines
-    from quarterdeck.mission.cover import cover
+    if method == "stc":
+        from quarterdeck.mission.cover import cover
 
-    return cover
+        return cover
+    added = addon_names(METHODS)
+    if method in added:
+        return addon(METHODS, method)
+    raise InputError(f"unknown method {method!r}; use one of {', '.join([*get_args(Method), *added])}")
 
 
 def within(time_limit: float | None, make: Callable[[], Mission]) -> Mission:

@@ -17,9 +17,9 @@ from quarterdeck.cli.output import (
     tolerance_option,
 )
 from quarterdeck.cli.parameters import Choice, Numbers, Real
+from quarterdeck.geo.addons import METHODS, addon_names
 
 if TYPE_CHECKING:
-    from quarterdeck.api import Method
     from quarterdeck.geo.frame import Frame
     from quarterdeck.geo.scenario import Scenario
     from quarterdeck.geo.terrain import Terrain
@@ -34,7 +34,7 @@ OPTIONS = {
 @click.command(short_help="Cover an area.")
 @click.argument("site", default="-")
 @output_option
-@click.option("--method", type=Choice(list(OPTIONS)),
+@click.option("--method", type=Choice([*OPTIONS, *addon_names(METHODS)]),
               help="stc: spanning trees; lines: parallel lines (default where a vehicle has a sensor); "
               "guards: all seen from within a range.")  # fmt: skip
 @click.option("--spacing", type=Real(), help="stc, lines: metres between neighbouring tracks (the paper's 2 delta).")
@@ -62,7 +62,7 @@ OPTIONS = {
 def command(
     site: str,
     output: str,
-    method: "Method | None",
+    method: str | None,
     terrain: str | None,
     tolerance: float,
     seed: int,
@@ -78,7 +78,7 @@ def command(
     scenario = read_scenario(site)
     method = method or default_method(scenario)
     for name in given:
-        if name not in OPTIONS[method]:
+        if name not in OPTIONS.get(method, given):
             raise click.UsageError(f"--{name.replace('_', '-')} does not belong to --method {method}")
     if "angle" in given:
         given["angle"] = math.radians(90.0 - given["angle"])

@@ -138,7 +138,7 @@ def remade(plan: Mission, scenario: Scenario, file: str, site: str) -> Mission:
     try:
         if plan.method == "assign":
             return assign(scenario, seed=plan.seed, **options)
-        return cover(scenario, method=plan.method, seed=plan.seed, **options)  # type: ignore[arg-type]
+        return cover(scenario, method=plan.method, seed=plan.seed, **options)
     except TypeError as error:
         raise InputError(f"{file}: its parameters cannot be used ({error}); plan the site again") from None
 
