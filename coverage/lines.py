@@ -182,8 +182,8 @@ def _pieces(
     shapes, strip = shapely.get_parts(stripes, return_index=True)
     bounds = shapely.bounds(shapes)
     middles = (lows + heights / 2.0)[strip]
-    reach = shapely.linestrings(np.stack([bounds[:, [0, 2]], np.column_stack([middles, middles])], axis=2))
-    reach = reach[bounds[:, 2] > bounds[:, 0]]
+    ways = np.stack([bounds[:, [0, 2]], np.column_stack([middles, middles])], axis=2)
+    reach = shapely.linestrings(ways[bounds[:, 2] > bounds[:, 0]])  # an empty strip's bounds are no numbers
     merged = shapely.get_parts(shapely.line_merge(shapely.union_all(reach))) if len(reach) else reach
     kept = shapely.get_parts(shapely.intersection(merged, space))
     kept = kept[(shapely.get_type_id(kept) == 1) & (shapely.length(kept) >= SHORTEST * spacing)]

@@ -302,7 +302,7 @@ def _began(vehicle: Vehicle, route: Route, log: Log, track: Track) -> float:
     return max(taken) if taken else left - wait
 
 
-MOMENT, CREEP = 5.0, 0.1  # s, m: who moves less in that time, but for the receiver's noise, is at rest
+MOMENT, CREEP = 5.0, 0.03  # s, m: who moves less in that time, but for the receiver's noise, is at rest
 
 
 def at_rest(track: Track, stay: slice, *, last: bool) -> float:

@@ -97,7 +97,7 @@ def observed_trace(mission: Mission, tracks: Sequence[Track], followed: Sequence
     In gaps, before a log's beginning and after its end `kind` is UNKNOWN. After it has come home a vehicle lies there.
     """
     usual = [float(np.median(np.diff(t.time))) for t in tracks if len(t.time) > 1]
-    step = float(np.clip(min(usual, default=COARSEST), FINEST, COARSEST))
+    step = round(float(np.clip(min(usual, default=COARSEST), FINEST, COARSEST)), 3)
     until = max((float(t.time[-1]) for t in tracks), default=0.0)
     step = max(step, until / MOST)
     time = np.arange(int(np.ceil(until / step - 1e-9)) + 1) * step
