@@ -120,7 +120,7 @@ def _gpx(path: str, data: bytes) -> list[Log]:
     for track in root.iter("{*}trk"):
         points = list(track.iter("{*}trkpt"))
         rows = [(p.get("lon"), p.get("lat"), p.findtext("{*}ele"), p.findtext("{*}time")) for p in points]
-        timed = [r for r in rows if r[3]]
+        timed = [r for r in rows if not np.isnan(_time(r[3] or ""))]
         notes = [*damaged]
         if len(timed) < len(rows):
             notes.append(f"{path}: {len(rows) - len(timed)} of {len(rows)} points without a time are left out")

@@ -8,7 +8,7 @@ from numba import njit
 
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.mission import Mission, Route, unbroken
-from quarterdeck.mission.tracks import Track, at_rest
+from quarterdeck.mission.track import Track, at_rest
 
 OFF = 9.0  # what a place far off a leg costs, at the most; one as far off as the tolerance costs 1
 JUMP = 10 * OFF  # what going on at any other leg costs: as much as ten places far off

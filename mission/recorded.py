@@ -17,7 +17,7 @@ from quarterdeck.mission.progress import Progress, planned_progress
 from quarterdeck.mission.remaining import remaining_parts
 from quarterdeck.mission.served import served_tasks
 from quarterdeck.mission.survey_recovery import VISITED
-from quarterdeck.mission.tracks import Track
+from quarterdeck.mission.track import Track
 
 FINE = 1e-3  # spacings: tracks are thinned by no more
 JUST = 10.0  # s: what is just done, or about to be, may count as either
@@ -47,7 +47,8 @@ def recorded_progress(
         height = float(np.nan_to_num(track.z[-1]))
         positions[vehicle.id] = (float(track.x[-1]), float(track.y[-1]), height)
         on = follow(mission, track)
-        along[vehicle.id] = route.duration if track.arrived <= last else planned_time(vehicle, route, track, on)
+        home = track.arrived <= last and int(on.leg[-1]) == len(route.waypoints) - 1
+        along[vehicle.id] = route.duration if home else planned_time(vehicle, route, track, on)
         used = track.energy[np.isfinite(track.energy)]
         if not len(used):
             notes.append(f"{vehicle.id}: no energy in its log; it has used what the plan says for the way so far")

@@ -6,7 +6,7 @@ import numpy as np
 
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.mission import Mission, Waypoint
-from quarterdeck.mission.tracks import Track
+from quarterdeck.mission.track import Track
 
 REACH = 2.0  # m, or the vehicle's length: so near to a task it is done
 EARLY = 1.0  # s by which a service may fall short: logs are no finer

@@ -15,7 +15,8 @@ from quarterdeck.mission.matching import Followed, follow, off_legs
 from quarterdeck.mission.mission import Mission, Route
 from quarterdeck.mission.recorded import progress_state, recorded_progress
 from quarterdeck.mission.served import served_tasks
-from quarterdeck.mission.tracks import NEAR, Record, Track
+from quarterdeck.mission.track import NEAR, Track
+from quarterdeck.mission.tracks import Record
 from quarterdeck.physics.paths import LEGS, vehicle_limits
 from quarterdeck.physics.report import Report, measure
 from quarterdeck.physics.seen import unseen, whole_tracks
