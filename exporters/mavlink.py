@@ -59,8 +59,9 @@ def mission_items(mission: Mission, route: Route, settings: Settings) -> list[It
     speed, shooting = 0.0, False
     for i in path:
         waypoint = route.waypoints[i]
-        flat = math.dist(route.xyz[i, :2], route.xyz[i - 1, :2])  # what autopilots are told is the speed over ground
-        along = waypoint.speed * flat / (math.hypot(flat, waypoint.z - route.waypoints[i - 1].z) or 1.0)
+        before = route.waypoints[i - 1]
+        flat = math.hypot(waypoint.x - before.x, waypoint.y - before.y)
+        along = waypoint.speed * flat / (math.hypot(flat, waypoint.z - before.z) or 1.0)  # over ground
         if along > 0 and abs(along - speed) > 0.005:
             speed = along
             items.append(Item(CHANGE_SPEED, MISSION_FRAME, (1.0, round(speed, 3), -1.0, 0.0)))

@@ -5,6 +5,8 @@ scale, north up at its centre) but turned and scaled against it, by metres in a 
 metres are made anew, as MOOS will read them.
 """
 
+from functools import cache
+
 import numpy as np
 from pyproj import Transformer
 
@@ -37,11 +39,16 @@ def local_metres(frame: Frame, xy: np.ndarray) -> np.ndarray:
     """Return (n, 2) metres east and north of the frame's origin as MOOSGeodesy's LatLong2LocalUTM counts them."""
     zone = int((frame.lon + 180.0) % 360.0 // 6.0) + 1
     south = " +south" if frame.lat < 0 else ""
-    utm = Transformer.from_crs("EPSG:4326", f"+proj=utm +zone={zone}{south} +ellps=WGS84 +units=m +no_defs", always_xy=True)
+    utm = _utm(f"+proj=utm +zone={zone}{south} +ellps=WGS84 +units=m +no_defs")
     lonlat = frame.to_degrees(xy)
     east, north = utm.transform(lonlat[:, 0], lonlat[:, 1])
     east0, north0 = utm.transform(frame.lon, frame.lat)
     return np.column_stack([east - east0, north - north0])
+
+
+@cache
+def _utm(crs: str) -> Transformer:
+    return Transformer.from_crs("EPSG:4326", crs, always_xy=True)
 
 
 def _behaviours(mission: Mission, vehicle: Vehicle, route: Route, origin: str) -> str:
