@@ -23,7 +23,6 @@ from quarterdeck.mission.check import check_mission, unsound
 from quarterdeck.mission.follow import follow
 from quarterdeck.mission.heights import knows_ground
 from quarterdeck.mission.mission import Mission
-from quarterdeck.mission.sorties import sorties
 from quarterdeck.mission.timing import shortfalls
 
 Autopilot = Literal["ardupilot", "px4"]
@@ -147,6 +146,8 @@ def _parts(mission: Mission, split: bool, terrain: Terrain | None, tolerance: fl
         return [("", mission)]
     if terrain is None and knows_ground(mission):
         raise InputError("sorties of a plan over terrain have new ways home; export them with --terrain FILE")
+    from quarterdeck.mission.sorties import sorties  # its shortest paths are slow to import
+
     rounds = sorties(mission)
     away = [replace(m, routes=tuple(r for r in m.routes if len(r.waypoints) > 1)) for m in rounds]
     if terrain is not None:

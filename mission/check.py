@@ -12,7 +12,6 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
 from quarterdeck.geo.scenario import Vehicle
-from quarterdeck.mission.guard_check import unproved
 from quarterdeck.mission.heights import too_high, too_steep
 from quarterdeck.mission.mission import Mission, Route, Waypoint
 from quarterdeck.mission.timing import shortfalls
@@ -41,7 +40,11 @@ def check_mission(mission: Mission) -> tuple[str, ...]:
     ]
     for route in mission.routes:
         problems += shortfalls(mission.vehicle(route.vehicle), route)
-    problems += [*too_high(mission), *too_steep(mission), *unproved(mission)]
+    problems += [*too_high(mission), *too_steep(mission)]
+    if mission.method == "guards":
+        from quarterdeck.mission.guard_check import unproved  # numba and more, which exports need not wait for
+
+        problems += unproved(mission)
     return tuple(dict.fromkeys(problems))
 
 
