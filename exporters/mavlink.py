@@ -118,7 +118,7 @@ def tell_limits(mission: Mission, settings: Settings) -> None:
                 "widen the spacing, or use more vehicles or sorties"
             )
     for vehicle in mission.vehicles:
-        if vehicle.clearance < CORNER:
+        if vehicle.clearance <= CORNER:
             settings.tell(
                 f"{vehicle.id}: autopilots cut corners by about {CORNER:g} m and its clearance is {vehicle.clearance:g} m; "
                 f"lower the autopilot's waypoint radius to {acceptance_radius(vehicle):g} m"
@@ -173,9 +173,9 @@ def compass(xy: np.ndarray) -> np.ndarray:
 def acceptance_radius(vehicle: Vehicle) -> float:
     """Return metres within which a waypoint counts as reached.
 
-    Autopilots cut the corner by about as much, so it is never above the clearance.
+    Autopilots cut the corner by about as much, so it is below the clearance where that leaves half a metre.
     """
-    radius = max(0.5, min(2.0, vehicle.clearance)) if vehicle.clearance > 0 else 1.0
+    radius = max(0.5, min(2.0, 0.8 * vehicle.clearance)) if vehicle.clearance > 0 else 1.0
     return round(radius, 2)
 
 

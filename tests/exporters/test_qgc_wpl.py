@@ -1,8 +1,12 @@
 """WPL files as pymavlink, the strictest rules and the autopilots read them."""
 
+import ast
 import json
 import math
 import re
+import subprocess
+import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -131,3 +135,29 @@ def test_altitudes_that_cannot_be_are_refused(quads, tmp_path):
     for options, words in (({"altitude": "amsl"}, "--ground"), ({"altitude": "terrain", "autopilot": "px4"}, "PX4")):
         with pytest.raises(InputError, match=words):
             export(quads, "qgc-wpl", tmp_path, **options)
+
+
+@pytest.mark.parametrize("clearance", [0.0, 0.4, 0.8, 1.9, 2.0, 2.6, 5.0])
+def test_clearance_exceeds_the_acceptance_radius_or_it_is_told(boats, clearance):
+    """Corners are cut by as much as waypoints accept: less than the clearance, or the user is told."""
+    vehicles = tuple(replace(v, clearance=clearance) for v in boats.vehicles)
+    said = []
+    made = qgc_wpl.files(replace(boats, vehicles=vehicles), Settings("ardupilot", said.append))
+    accepted = {float(row.split("\t")[5]) for row in made["usv1.waypoints"].splitlines()[2:] if row.split("\t")[3] == "16"}
+    assert max(accepted) < clearance or any("usv1: autopilots cut corners" in line for line in said)
+    assert any("cut corners" in line for line in said) == (clearance <= 2.0)
+
+
+def test_pymavlink_reads_fences_and_rally_points(boats, tmp_path):
+    """Its loaders of fences and rally points, which want MAVLink 2 from the start, give back every vertex."""
+    made = qgc_wpl.files(boats, Settings())
+    for kind, name in (("Fence", "usv1.fence.txt"), ("Rally", "usv1.rally.txt")):
+        (tmp_path / name).write_text(made[name])
+        code = (
+            "import os, sys; os.environ['MAVLINK20'] = '1'\nfrom pymavlink import mavwp\n"
+            f"loader = mavwp.MissionItemProtocol_{kind}(); loader.load(sys.argv[1])\n"
+            "print([(w.command, w.x, w.y) for w in loader.wpoints])"
+        )
+        done = subprocess.run([sys.executable, "-c", code, tmp_path / name], capture_output=True, text=True, check=True)
+        rows = [row.split("\t") for row in made[name].splitlines()[1:]]
+        assert ast.literal_eval(done.stdout) == [(int(r[3]), float(r[8]), float(r[9])) for r in rows]
