@@ -112,6 +112,8 @@ def _undone(mission: Mission, run: Run, watched: Watched, last: Mission, unheard
             if t.id in place and place.get(a.task, len(place)) > place[t.id]
         ]
         wrong = [f"not served: {', '.join(undone)}"] if undone else []
+        slow = [t.id for t in run.report.tasks if t.fast is None]
+        wrong += [f"not served in the fast world: {', '.join(slow)}"] if slow else []
         wrong += [f"served twice: {', '.join(twice)}"] if twice and not unheard else []
         return wrong + ([f"served {', '.join(early)}"] if early and not unheard else [])
     spacing = float(mission.spacing or 0.0)

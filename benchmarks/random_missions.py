@@ -69,7 +69,7 @@ def _scenario(kind: str, domain: str, rng: np.random.Generator) -> Scenario:
     holes = _holes(area, side, spacing, rng)
     margin = rng.uniform(1.2, 3.0) * (model.clearance + max(model.turn_radius, model.length))
     operating = area.buffer(margin, join_style="mitre")
-    site = Site((Area("area", MultiPolygon([area])),), MultiPolygon([operating]), holes)
+    site = Site((Area("area", as_multipolygon(area)),), as_multipolygon(operating), holes)
     room = site.navigable(domain, 1.3 * model.clearance).buffer(-0.1 * margin)
     homes = _berths(room, operating, count, 4.0 * model.length + 2.0 * model.clearance, rng)
     vehicles = tuple(

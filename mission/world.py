@@ -14,7 +14,7 @@ import numba
 import numpy as np
 
 from quarterdeck.geo.deadline import cause, time_is_up
-from quarterdeck.mission.director import Command, Director, Event, State
+from quarterdeck.mission.director import Command, Director, Event, State, wake_time
 
 SAME = 1e-9  # s: events this close are one moment
 EDGE = 1e-6  # m: contact is lost this far beyond the range, so that a range just reached is not lost by rounding
@@ -90,7 +90,7 @@ def run_world(
     `pairs` are the indices of actors who notice each other within `reach` metres: event `met`, once each time they come
     into range. Further events: `seen` (each target once by each actor, its `data` and position with it), `served` (a
     waypoint's task, after its hold), `lost` (data `kind`) and, of who was silent, `returned`. The director is called at
-    each, and whenever somebody has become idle.
+    each, whenever somebody has become idle, and when it wants to be.
     """
     ids = [a.id for a in actors]
     index = {name: i for i, name in enumerate(ids)}
@@ -148,6 +148,7 @@ def run_world(
             float(sight.min()) if sight.size else inf,
             min(switch, default=inf),
             pending[0][0] if pending else inf,
+            max(wake_time(memory), now),
         )
         if then == inf or then > until:
             reason = "" if then == inf else f"the mission was not over after {until:g} s"

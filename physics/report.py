@@ -13,6 +13,7 @@ from shapely import LineString
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.version import VERSION
+from quarterdeck.mission.fast import FastRun
 from quarterdeck.mission.mission import Mission, Route
 from quarterdeck.physics.seen import seen_fraction, whole_tracks
 from quarterdeck.physics.swath import covered_fraction, driven_tracks, planned_tracks
@@ -66,7 +67,7 @@ class Localisation:
 class VehicleReport:
     """One vehicle's run. Times s, energies Wh, distances m; `touched` counts separate contacts that PyBullet told of,
     `hits` names the obstacles that the hull went through by the swept-path check; None where there is nothing to be
-    near to.
+    near to. `time_fast` is its time in the fast world.
     """
 
     id: str
@@ -92,6 +93,7 @@ class VehicleReport:
     length: float
     lost: bool = False
     localisation: Localisation | None = None
+    time_fast: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,13 +167,14 @@ def measure(
     triage: Mapping[str, Any] | None = None,
     servers: Mapping[str, str] | None = None,
     undone: Sequence[str] = (),
+    fast: FastRun | None = None,
 ) -> Report:
     """Measure a trace against the mission and judge it.
 
     `finished` and `aground` are (k,), `served` the times at which tasks were, `lost` (k,) the vehicles lost by a fault
     (default: none), `trouble` what went wrong, a line each, `localisation` what `Senses.report` returns, `notes` what is
     told of a log, `triage` what `triage.Compared.document` returns; `servers` the vehicles that served tasks, `undone` why
-    others were not served, as `task_reports` takes them.
+    others were not served, as `task_reports` takes them; `fast` what the fast world came to.
     Raises InputError for an unknown limit.
     """
     allowed = check_limits(limits)
@@ -189,6 +192,10 @@ def measure(
     figures = _figures(mission, trace, vehicles, served)
     reasons = [*trouble, *_reasons(mission, vehicles, figures, allowed)]
     tasks = task_reports(mission, trace, served, servers or {}, undone)
+    if fast is not None:
+        figures |= {"time_fast": fast.time, "tasks_served_fast": len(fast.served.keys() & {t.id for t in tasks})}
+        vehicles = tuple(replace(v, time_fast=fast.times[v.id]) for v in vehicles)
+        tasks = tuple(replace(t, fast=fast.served.get(t.id)) for t in tasks)
     reasons += [f"task {t.id!r} not served: {t.reason}" for t in tasks if t.reason] if allowed["unserved"] == 0 else []
     reasons += [line for line in undone if not line.startswith("task ")]
     told = tuple(reasons)

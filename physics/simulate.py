@@ -11,12 +11,14 @@ from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.occupancy import Occupancy
 from quarterdeck.geo.scenario import Site
 from quarterdeck.geo.terrain import Terrain
+from quarterdeck.mission import world as fast_world
 from quarterdeck.mission.director import Director
+from quarterdeck.mission.fast import FastRun, run_fast
 from quarterdeck.mission.inspection import default_director
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.recovery import undone
 from quarterdeck.mission.triage.plan import METHOD
-from quarterdeck.physics.faults import read_faults
+from quarterdeck.physics.faults import Fault, read_faults
 from quarterdeck.physics.mapping import agreement
 from quarterdeck.physics.report import Report, measure
 from quarterdeck.physics.running import DECIDE, Running
@@ -57,6 +59,7 @@ def simulate(
     limits: Mapping[str, float] | None = None,
     duration: float | None = None,
     progress: Callable[[float, float], None] | None = None,
+    expected: Director | None = None,
 ) -> Run:
     """Execute `mission` in PyBullet under `director` (default: its routes, or its schedule of tasks) and judge it.
 
@@ -65,7 +68,9 @@ def simulate(
     deviation of Dryden gusts in m/s. `faults` are texts as `faults.read_faults` takes them; `sensing` says what is sensed
     instead of known (default: all is known). `terrain` is the ground (default: flat). `limits` change the verdict's
     (see report.LIMITS). The run ends when every vehicle is done, or after `duration` seconds (default: twice the planned
-    time and ten minutes). `progress` is told seconds done and expected.
+    time and ten minutes; of all vehicles' times together where a director may replan). `progress` is told seconds done and
+    expected. Plans of tasks, and those under a director, are run in the fast world too, under `expected` (default: the same
+    director), and stand beside the run in the report.
 
     Raises InputError for a vehicle model without its dynamics or a wrong option, UnavailableError where PyBullet is
     absent.
@@ -74,7 +79,8 @@ def simulate(
     if terrain is not None:
         check_terrain(terrain, mission)
     planned = max((max(r.duration, r.length / mission.vehicle(r.vehicle).speed) for r in mission.routes), default=0.0)
-    until = 2.0 * planned + 600.0 if duration is None else duration
+    worst = planned if director is None else sum(r.duration for r in mission.routes)
+    until = 2.0 * max(planned, worst) + 600.0 if duration is None else duration
     ids = [v.id for v in mission.vehicles]
     befalling, sensing = read_faults(faults, ids, planned, seed), sensing or Sensing()
     triage = mission.method == METHOD
@@ -83,6 +89,7 @@ def simulate(
         # Its routes are those without a find; what casualties add to them shows only in the run.
         until = max(until, TRIAGE) if duration is None else until
         limits = {"delay": LATE} | dict(limits or {})
+    plan, beside = mission, director is not None or mission.method == "assign"
     known, director = mission.site, director or default_director(mission)
     there = known.obstacles if sensing.world is None else sensing.world
     mission = replace(mission, site=replace(known, obstacles=(*there, *sensing.unmapped)))
@@ -144,12 +151,20 @@ def simulate(
         triage=compared.document() if compared else None,
         servers=run.servers,
         undone=undone(run.memory),
+        fast=_fast(plan, expected or director, befalling, until) if beside and not triage else None,
     )
     made = None
     if sensing.mapping and run.router is not None:
         made = replace(run.router.shared.occupancy(), place=(mission.frame.lon, mission.frame.lat))
         report = replace(report, figures={**report.figures, **agreement(made, mission.site)})
     return Run(trace, report, compared, mission.site, made)
+
+
+def _fast(mission: Mission, director: Director, faults: Sequence[Fault], until: float) -> FastRun:
+    """Return what the fast world, which knows vehicles lost and radios silent, comes to."""
+    gone = [fast_world.Fault(f.vehicle, f.start) for f in faults if f.kind == "lost"]
+    silent = [fast_world.Fault(f.vehicle, f.start, "mute", f.end) for f in faults if f.kind == "comms"]
+    return run_fast(mission, director, gone + silent, until=until)
 
 
 def _check(

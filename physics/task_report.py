@@ -28,12 +28,16 @@ class Service:
 
 @dataclass(frozen=True, slots=True)
 class TaskReport:
-    """A task as `planned` and as `driven`; None where it was not. `reason` says why it was not served ("": it was)."""
+    """A task as `planned` and as `driven`; None where it was not. `reason` says why it was not served ("": it was).
+
+    `fast` is the second at which it was served in the fast world, if it was.
+    """
 
     id: str
     planned: Service | None
     driven: Service | None
     reason: str
+    fast: float | None = None
 
 
 def task_reports(

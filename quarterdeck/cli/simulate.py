@@ -223,6 +223,7 @@ def execute(
         run = simulate(
             mission,
             director=recovering(mission, delay=delay, tell=_replanned) if recover else None,
+            expected=recovering(mission, delay=delay) if recover else None,
             seed=seed,
             step=step,
             current=current,
@@ -294,6 +295,9 @@ def print_report(mission: Mission, report: Report, *, how: str = "simulated") ->
         words.append(f"coverage {figures['coverage_driven']:.2%} driven of {figures['coverage_planned']:.2%} planned")
     if figures["tasks_planned"]:
         words.append(f"tasks {figures['tasks_served']} of {figures['tasks_planned']} served")
+    if (fast := figures.get("time_fast")) is not None:
+        tasks = f", {figures['tasks_served_fast']} tasks" if figures["tasks_planned"] else ""
+        words.append(f"took {minutes(figures['time'] or 0.0)}, in the fast world {minutes(fast)}{tasks}")
     words.append(f"collisions {figures['collisions']}")
     words.append(f"finished {figures['finished']} of {len(report.vehicles)}")
     if figures["lost"]:
