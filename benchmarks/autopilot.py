@@ -11,6 +11,7 @@ log is kept in `--logs`, for `quarterdeck report`.
 
 import argparse
 import json
+import math
 import shutil
 import subprocess
 import sys
@@ -29,6 +30,7 @@ from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.planfile import read_plan
 
 MISSION, FENCE, RALLY = 0, 1, 2
+SETTLE = 60.0  # s after the end in which a boat comes to its last place
 # domain: program, simulated frame, its parameters in Tools/autotest/default_params
 FRAMES = {
     "ground": ("ardurover", "rover-skid", ["rover.parm", "rover-skid.parm"]),
@@ -199,7 +201,7 @@ def _follow(link, last: int, vehicle: Vehicle, program: subprocess.Popen[bytes])
     """Follow until the mission is over: the last item reached, or disarmed after landing."""
     track: list[tuple[float, float, float, float]] = []
     said: list[str] = []
-    pictures, ended, reached = 0, False, -1
+    pictures, ended, reached, settled = 0, False, -1, math.inf
     heard = time.monotonic()
     while time.monotonic() - heard < 60 and program.poll() is None:
         message = link.recv_match(blocking=True, timeout=5)
@@ -216,9 +218,10 @@ def _follow(link, last: int, vehicle: Vehicle, program: subprocess.Popen[bytes])
         elif kind == "STATUSTEXT":
             said.append(message.text)
             print(f"{vehicle.id}: {message.text}", file=sys.stderr)
-            ended = ended or "Mission Complete" in message.text
+            if "Mission Complete" in message.text:
+                ended, settled = True, track[-1][0] + SETTLE
         disarmed = kind == "HEARTBEAT" and message.get_srcComponent() == 1 and not link.motors_armed()
-        if (vehicle.domain != "aerial" and ended) or (disarmed and len(track) > 50):
+        if (ended and track[-1][0] > settled) or (disarmed and len(track) > 50):
             ended = ended or reached >= last - 1
             break
     breaches = sum("breach" in line.lower() for line in said)
