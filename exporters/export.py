@@ -108,14 +108,14 @@ def export(
     if altitude == "terrain" and autopilot == "px4":
         raise InputError("PX4 takes no mission items above terrain; export relative or amsl altitudes")
     told: dict[str, None] = {}
+    if problems := unsound(mission):
+        raise InputError(f"the plan makes no sense: {problems[0]}{_more(problems)}; plan it again")
     if terrain is not None:
         mission = follow(mission, terrain, tolerance=tolerance)
     elif "terrain" in mission.parameters and not knows_ground(mission):
         raise InputError("the plan was made over terrain and has changed since; export it with --terrain FILE")
     if ground is not None and knows_ground(mission):
         raise InputError("the plan knows its ground from the terrain; leave out --ground")
-    if problems := unsound(mission):
-        raise InputError(f"the plan makes no sense: {problems[0]}{_more(problems)}; plan it again")
     if altitude == "amsl" and not knows_ground(mission) and (ground is None or not math.isfinite(ground)):
         raise InputError("altitudes above mean sea level need the ground's: give --ground METRES, or --terrain FILE")
     settings = Settings(autopilot, lambda line: told.setdefault(line), altitude, ground or 0.0, storage, depart)
@@ -146,13 +146,26 @@ def _parts(mission: Mission, split: bool, terrain: Terrain | None, tolerance: fl
         return [("", mission)]
     if terrain is None and knows_ground(mission):
         raise InputError("sorties of a plan over terrain have new ways home; export them with --terrain FILE")
+    away = _rounds(mission) if terrain is None else _rounds_over(mission, terrain, tolerance)
+    return [(f"sortie-{number}/", part) for number, part in enumerate(away, 1)]
+
+
+def _rounds(mission: Mission) -> list[Mission]:
     from quarterdeck.mission.sorties import sorties  # its shortest paths are slow to import
 
-    rounds = sorties(mission)
-    away = [replace(m, routes=tuple(r for r in m.routes if len(r.waypoints) > 1)) for m in rounds]
-    if terrain is not None:
-        away = [follow(part, terrain, tolerance=tolerance) for part in away]
-    return [(f"sortie-{number}/", part) for number, part in enumerate(away, 1)]
+    return [replace(m, routes=tuple(r for r in m.routes if len(r.waypoints) > 1)) for m in sorties(mission)]
+
+
+def _rounds_over(mission: Mission, terrain: Terrain, tolerance: float) -> list[Mission]:
+    """Sorties over terrain: ways out and home climb too, so that each has as much less to do as they need."""
+    part = 1.0
+    while True:
+        limited = tuple(replace(v, endurance=part * v.endurance, battery=part * v.battery) for v in mission.vehicles)
+        rounds = [replace(m, vehicles=mission.vehicles) for m in _rounds(replace(mission, vehicles=limited))]
+        away = [follow(m, terrain, tolerance=tolerance) for m in rounds]
+        if not any(shortfalls(mission.vehicle(r.vehicle), r) for m in away for r in m.routes):
+            return away
+        part *= 0.95
 
 
 def _check(mission: Mission, names: Iterable[str], settings: Settings, *, unsafe: bool) -> None:

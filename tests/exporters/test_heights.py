@@ -1,5 +1,7 @@
 """Heights in autopilots' files: one place in all frames, over terrain as on a plain; what is said, and when."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -70,12 +72,26 @@ def test_terrain_may_come_at_export(quads, hills, tmp_path):
         assert path.read_text() == (tmp_path / "b" / path.name).read_text()
 
 
+def test_sorties_over_terrain_are_followed_too(quads, hills, tmp_path):
+    """Ways home of their own get their own waypoints; without the terrain they are refused, for it is needed again."""
+    tired = replace(quads, vehicles=tuple(replace(v, endurance=200.0) for v in quads.vehicles))
+    mission = follow(tired, hills)
+    with pytest.raises(InputError, match="sorties of a plan over terrain"):
+        export(mission, "qgc-wpl", tmp_path / "a", split=True)
+    paths = export(mission, "qgc-wpl", tmp_path / "b", split=True, terrain=hills, altitude="amsl")
+    assert {p.parent.name for p in paths} >= {"sortie-1", "sortie-2"}
+    for path in paths:
+        if path.suffix == ".waypoints":
+            for command, _, lat, lon, altitude in rows(path.read_text()):
+                if command == 16 and altitude > 0:
+                    xy = mission.frame.to_metres(np.array([[float(lon), float(lat)]]))[0]
+                    assert altitude - hills.height(xy) > -0.01
+
+
 def test_what_the_ground_cannot_be_is_refused(quads, hills, tmp_path):
     """A second ground, and a plan over terrain that has lost its ground, are each one line."""
     with pytest.raises(InputError, match="leave out --ground"):
         export(follow(quads, hills), "qgc-wpl", tmp_path, ground=10.0, altitude="amsl")
-    from dataclasses import replace
-
     changed = replace(quads, parameters={"terrain": "hills.tif"})
     with pytest.raises(InputError, match="with --terrain FILE"):
         export(changed, "qgc-wpl", tmp_path)

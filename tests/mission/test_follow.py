@@ -1,6 +1,7 @@
 """Over terrain: heights held, rates kept, ceilings told, and what a camera sees at worst."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import MultiPolygon, box
 
+from quarterdeck.cli import main
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.models import load_model
@@ -19,6 +21,9 @@ from quarterdeck.mission.follow import follow
 from quarterdeck.mission.heights import levels
 from quarterdeck.mission.lines import plan_lines
 from quarterdeck.mission.planfile import plan_text, read_plan
+
+DATA = Path(__file__).resolve().parents[2] / "data"
+pytestmark = pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # affine's operators, in rasterio itself
 
 
 def ground(seed, rough=30.0, cell=5.0, size=1000.0):
@@ -149,3 +154,39 @@ def test_a_void_under_a_route_and_a_tolerance_of_nothing_are_refused(field):
         follow(field, Terrain(terrain.origin, terrain.cell, holed, "hills"))
     with pytest.raises(InputError, match="above 0"):
         follow(field, terrain, tolerance=0.0)
+
+
+def test_from_the_command_line(tmp_path, capsys):
+    """`plan --terrain` of a GeoTIFF writes a plan that checks; a void, or nobody who flies, is one line and 2."""
+    rasterio = pytest.importorskip("rasterio", reason="rasterio (the extra terrain) is not installed")
+    site, dem = str(DATA / "farm_survey.geojson"), tmp_path / "dem.tif"
+    transform = rasterio.transform.from_origin(5.64, 52.0, 2e-4, 2e-4)
+    columns, lines = np.meshgrid(np.arange(200), np.arange(150))
+    heights = 20.0 + 15.0 * np.sin(columns / 9.0) * np.cos(lines / 11.0)
+    shape = {"width": 200, "height": 150, "count": 1, "dtype": "float32", "crs": "EPSG:4326", "transform": transform}
+    for name, part in (("dem.tif", heights), ("holed.tif", np.where(columns == 110, -9999.0, heights))):
+        with rasterio.open(tmp_path / name, "w", driver="GTiff", nodata=-9999, **shape) as file:
+            file.write(part.astype("float32"), 1)
+    plan = tmp_path / "plan.geojson"
+    with pytest.raises(SystemExit) as stop:
+        main(["plan", site, "--terrain", str(dem), "-o", str(plan), "--placement", "none"])
+    said = " ".join(capsys.readouterr().err.split())
+    assert stop.value.code == 0, said
+    assert "waypoints for the terrain" in said
+    assert "highest above sea" in said
+    with pytest.raises(SystemExit) as stop:
+        main(["check", str(plan)])
+    assert stop.value.code == 0, capsys.readouterr().out
+    sea = str(DATA / "dalian_harbour.geojson")
+    capsys.readouterr()
+    for where, terrain, words in (
+        (site, "holed.tif", "holed.tif: has a void in the site"),
+        (sea, "dem.tif", "for what flies"),
+    ):
+        with pytest.raises(SystemExit) as stop:
+            main(["plan", where, "--terrain", str(tmp_path / terrain), "-o", str(tmp_path / "no.geojson")])
+        error = capsys.readouterr().err
+        assert stop.value.code == 2
+        assert words in error
+        assert len(error.splitlines()) == 1
+    assert not (tmp_path / "no.geojson").exists()
