@@ -26,6 +26,11 @@ OTHERS = 0.5  # m about the hull of another robot in contact, whose echoes are n
 AGAIN = 10.0  # s between two attempts of a robot that gets no further
 LOOK = 5.0  # s for which it looks on before it says that there is no way
 PATIENCE = 60.0  # s without getting further, after which there is no way
+STANDS, MOVED = 10.0, 0.3  # s in which a robot that is under way and has not moved so many metres has stalled
+QUEUE = 300.0  # s for which it lets others keep it from its way
+YIELDS = 10.0  # s that one that made room waits there
+ROOM = 1.4  # lengths about the middle of another robot that a way around it, or out of its way, keeps
+PLACES = 12  # that are looked at to make room
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +55,11 @@ class Rerouting:
         self.apart: dict[int, Evidence] = {}  # the maps of robots that are not heard
         self.detours: dict[int, Detour] = {}
         self.stalled = np.full(len(vehicles), np.inf)  # since when
+        self.anchor, self.since, self.last = (
+            np.full((len(vehicles), 2), np.inf),
+            np.zeros(len(vehicles)),
+            -np.ones(len(vehicles)),
+        )
         self.tried = np.full(len(vehicles), -np.inf)
         self.barred = np.full(len(vehicles), np.inf)  # since when there is no way
         self.stuck: set[int] = set()  # those that have no way
@@ -128,19 +138,21 @@ class Rerouting:
         *,
         fresh: bool,
         stalled: bool,
-        others: np.ndarray,
+        others: Sequence[np.ndarray],
     ) -> Detour | None:
         """Return another way for robot `i`, now `here` (2,), if its own is barred; None if it may go on as it does.
 
         `done` of its `command`'s waypoints are reached, `ahead` are those that it now makes for. Its way is looked at when
-        the command is `fresh`, and against what was found; when it has `stalled`, it looks for a way around the `others`
-        (m, 2) too.
+        the command is `fresh`, and against what was found; when it has `stalled`, or stood still for STANDS, it looks for a
+        way around the `others` too: of each the (q, 2) places where it is and is going. If there is none, it makes room for
+        them, the last in the list first, and comes back.
         """
         vehicle, grid = self.vehicles[i], self._grid(i)
         stop = next((j for j, w in enumerate(command[done:], done) if _to_do(w)), len(command) - 1)
+        standing = self._standing(i, time, here)
         self.stalled[i] = min(self.stalled[i], time) if stalled else np.inf
-        if stalled:
-            if time > self.stalled[i] + PATIENCE:
+        if stalled or standing >= STANDS:
+            if time > self.stalled[i] + PATIENCE or standing > QUEUE:
                 return Detour((), 0, stop, done)
             if time < self.tried[i] + AGAIN:
                 return None
@@ -149,8 +161,10 @@ class Rerouting:
             self.barred[i] = np.inf
             return None
         free = self._clear_of(vehicle.clearance) & _aside(grid, self.found(i), vehicle.clearance)
-        if stalled:
-            free &= _aside(grid, others, 2 * vehicle.model.length)
+        stalled = stalled or standing >= STANDS
+        if stalled and len(others):
+            clear = free
+            free = free & _aside(grid, np.array([way[0] for way in others]), ROOM * vehicle.model.length)
         # Who is nearer to a thing than the clearance goes to the nearest place that is not, as plans do.
         reach = vehicle.clearance + 2 * grid.resolution
         for j in range(stop, len(command)):
@@ -167,9 +181,59 @@ class Rerouting:
             if command[j].task is not None:
                 break
         if stalled:
+            later = sum(np.hypot(*(way[0] - here)) < 6 * vehicle.model.length for way in others[i:])
+            if others and standing >= STANDS * (1 + later):
+                return self._make_room(i, here, clear, free, others, command, stop, done)
             return None
         self.barred[i] = min(self.barred[i], time)
         return Detour((), 0, stop, done) if time >= self.barred[i] + LOOK else None
+
+    def _make_room(
+        self,
+        i: int,
+        here: np.ndarray,
+        clear: np.ndarray,
+        free: np.ndarray,
+        others: Sequence[np.ndarray],
+        command: tuple[Waypoint, ...],
+        stop: int,
+        done: int,
+    ) -> Detour | None:
+        """Return the way to the nearest place off the others' ways, a wait there, and the way on from it, if there is one.
+
+        `clear` (rows, cols) are the cells without, `free` those with the others in them.
+        """
+        vehicle, grid = self.vehicles[i], self._grid(i)
+        along = [shapely.get_coordinates(LineString(w).segmentize(grid.resolution)) if len(w) > 1 else w for w in others]
+        off = np.argwhere(free & _aside(grid, np.concatenate(along), ROOM * vehicle.model.length))
+        places = grid.to_metres(off + 0.5)
+        places = places[np.argsort(np.hypot(*(places - here).T), kind="stable")]
+        chosen: list[np.ndarray] = []
+        while len(places) and len(chosen) < PLACES:
+            chosen.append(places[0])
+            places = places[np.hypot(*(places - places[0]).T) > vehicle.model.length]
+        if not chosen:
+            return None
+        goal = np.array([command[stop].x, command[stop].y])
+        reach = vehicle.clearance + 2 * grid.resolution
+        out = find_ways(grid, free, nearest_free(grid, free, np.array([here, *chosen]), reach))
+        best = int(np.argmin(out.lengths[0, 1:])) + 1
+        way = out.path(0, best)
+        back = find_ways(grid, clear, nearest_free(grid, clear, np.array([chosen[best - 1], goal]), reach), "octile").path(
+            0, 1
+        )
+        if way is None or back is None:
+            return None
+        waits = Waypoint(float(way[-1, 0]), float(way[-1, 1]), hold=YIELDS)
+        via = (*(Waypoint(x, y) for x, y in way[:-1].tolist()), waits, *(Waypoint(x, y) for x, y in back[1:-1].tolist()))
+        return Detour((*via, *command[stop:]), len(via), stop, done)
+
+    def _standing(self, i: int, time: float, here: np.ndarray) -> float:
+        """Return for how many seconds a robot that is under way has hardly moved."""
+        if time - self.last[i] > 1.5 or np.hypot(*(here - self.anchor[i])) > MOVED:  # it held, or it moves
+            self.anchor[i], self.since[i] = here, time
+        self.last[i] = time
+        return float(time - self.since[i])
 
     def reached(self, actual: np.ndarray) -> np.ndarray:
         """Return (k,) how many waypoints of their commands robots have reached: `actual` (k,) are of what they drive."""

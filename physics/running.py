@@ -336,7 +336,7 @@ class Running:
             if done[i] >= len(command) or not present[i] or (mode[i] not in (SAIL, ROTATE) and i not in fresh):
                 continue
             ahead = router.driven(i, command)[actual[i] :]
-            others = believed[present & (np.arange(self.count) != i), :2]
+            others = [self._going(j, believed[j, :2], router, actual) for j in np.flatnonzero(present).tolist() if j != i]
             detour = router.detour(
                 i, self.time, believed[i, :2], command, int(done[i]), ahead,
                 fresh=i in fresh, stalled=bool(senses.stalled[i]), others=others,
@@ -352,6 +352,11 @@ class Running:
                 stop, rest = command[detour.onward], command[detour.onward :]
                 task = next((w.task for w in rest if w.task and (w.x, w.y) == (stop.x, stop.y)), "")
                 self.events.append(Event("unreachable", self.ids[i], task, data))
+
+    def _going(self, j: int, here: np.ndarray, router: Rerouting, actual: np.ndarray) -> np.ndarray:
+        """Return the (q, 2) places where a vehicle is and is going."""
+        ahead = router.driven(j, self.commands.get(self.ids[j], ()))[actual[j] :]
+        return np.array([here, *((w.x, w.y) for w in ahead)])
 
     def _reached(self) -> np.ndarray:
         """Return (k,) how many waypoints of its last command each has reached."""

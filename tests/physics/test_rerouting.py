@@ -141,3 +141,18 @@ def test_a_robot_that_is_not_heard_keeps_what_it_saw_until_it_is():
     assert len(router.found(1)) > 5
     assert np.allclose(router.found(1)[:, 0], 10.0, atol=0.2)
     assert not len(Rerouting(scenario.site, scenario.vehicles, np.array([0])).found(0))
+
+
+def test_two_that_meet_in_a_door_make_room():
+    """One backs out of the doorway, and both serve what lies beyond it."""
+    scenario = corridor(Task("east", (18.0, 2.0)), Task("west", (2.0, 2.0)), robots=2)
+    west, east = (
+        replace(v, start=xy, can=frozenset({v.id})) for v, xy in zip(scenario.vehicles, ((2, 2), (18, 2.1)), strict=True)
+    )
+    tasks = tuple(replace(t, needs=frozenset({n})) for t, n in zip(scenario.tasks, ("r1", "r2"), strict=True))
+    mission = assign(replace(scenario, vehicles=(west, east), tasks=tasks), iterations=5)
+    run = simulate(mission, sensing=Sensing(lidar=True, unmapped=(NORTH,)))
+    assert run.report.figures["tasks_served"] == 2
+    assert not run.report.figures["collisions"]
+    assert all(v.finished for v in run.report.vehicles)
+    assert run.trace.time[-1] < 200
