@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from quarterdeck.exporters.export import Settings
-from quarterdeck.exporters.places import file_stems
+from quarterdeck.exporters.places import file_stems, spacing_words
 from quarterdeck.geo.palette import colours
 from quarterdeck.mission.mission import Mission, Route
 
@@ -34,7 +34,7 @@ def page(mission: Mission) -> str:
         "end": max((route.duration for route in mission.routes), default=0.0),
     }
     state = "feasible" if mission.feasible else "INFEASIBLE: " + "; ".join(mission.reasons)
-    spacing = "" if mission.spacing is None else f", spacing {mission.spacing:g} m"
+    spacing = "" if mission.spacing is None else f", {spacing_words(mission)}"
     routes = [(i, route, colour) for i, (route, colour) in enumerate(zip(mission.routes, palette, strict=True))]
     parts = {
         "TITLE": escape(mission.name),

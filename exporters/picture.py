@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from quarterdeck.exporters.export import Settings
 from quarterdeck.exporters.map_furniture import fill, graticule, north_arrow, scale_bar
 from quarterdeck.exporters.map_panel import AREA, CONTACT, MISSED, OBSTACLE, START, STRANGE, TASK, WATER, legend, table
-from quarterdeck.exporters.places import file_stems
+from quarterdeck.exporters.places import file_stems, spacing_words
 from quarterdeck.geo.palette import CASUALTY, SITE, colours
 from quarterdeck.geo.scenario import Obstacle
 from quarterdeck.mission.mission import Mission
@@ -199,8 +199,7 @@ def _numbers(numbers: list[int]) -> str:
 
 def _caption(mission: Mission, report: Report | None) -> str:
     parts = [mission.method]
-    if mission.spacing is not None:
-        parts.append(f"spacing {mission.spacing:g} m")
+    parts += [spacing_words(mission)] if mission.spacing is not None else []
     parts += [f"seed {mission.seed}", "feasible" if mission.feasible else "INFEASIBLE"]
     if report is not None:
         parts.append("run: PASSED" if report.passed else "run: FAILED")

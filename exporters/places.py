@@ -32,6 +32,14 @@ def file_stems(mission: Mission) -> tuple[str, dict[str, str]]:
     return fleet, stems
 
 
+def spacing_words(mission: Mission) -> str:
+    """Return how far apart tracks are, in words; lines that follow soundings have no one spacing."""
+    if mission.spacing is None:
+        return ""
+    median = mission.parameters.get("spacing", mission.spacing) is None
+    return f"spacing by depth, about {mission.spacing:.3g} m" if median else f"spacing {mission.spacing:g} m"
+
+
 def printable(text: str) -> str:
     """Return the text without control characters, which XML cannot hold."""
     return "".join(c for c in text if unicodedata.category(c)[0] != "C") or "unnamed"

@@ -148,9 +148,14 @@ def _read_raster(path: str, frame: Frame, bounds: Bounds) -> Terrain:
     into = f"+proj=tmerc +lat_0={frame.lat!r} +lon_0={frame.lon!r} +k=1 +datum=WGS84 +units=m +no_defs"
     west, south, east, north = bounds[0] - ASIDE, bounds[1] - ASIDE, bounds[2] + ASIDE, bounds[3] + ASIDE
     try:
-        with warnings.catch_warnings(), rasterio.Env(GDAL_PAM_ENABLED="NO"), _open(rasterio, path) as file:
-            if file.count != 1:
-                raise InputError(f"{path}: has {file.count} bands and is no elevation model, which has one")
+        with (
+            np.errstate(all="ignore"),
+            warnings.catch_warnings(),
+            rasterio.Env(GDAL_PAM_ENABLED="NO"),
+            _open(rasterio, path) as file,
+        ):
+            if file.count != 1 or np.dtype(file.dtypes[0]).kind not in "iuf":
+                raise InputError(f"{path}: has {file.count} bands and is no elevation model, which has one of real numbers")
             if file.crs is None or file.transform.is_identity:
                 raise InputError(f"{path}: does not say where it lies (no coordinate system); give a georeferenced one")
             cell = _cell(file, frame, bounds)
@@ -162,8 +167,9 @@ def _read_raster(path: str, frame: Frame, bounds: Bounds) -> Terrain:
                 )
             window = _window(file, frame, (west, south, east, north), path)
             known = np.ma.filled(file.read(1, masked=True, window=window).astype(float), np.nan)
-            known[np.isin(known, VOIDS) | (known < LOWEST) | (known > HIGHEST)] = np.nan
+            known[np.isin(known, VOIDS)] = np.nan
             known = (known * file.scales[0] + file.offsets[0]) * _unit(file)
+            known[(known < LOWEST) | (known > HIGHEST)] = np.nan
             # Nodes lie in the middle of GDAL's pixels, whose rows run from the north.
             out = np.full((rows, columns), np.nan)
             rasterio.warp.reproject(
@@ -172,8 +178,10 @@ def _read_raster(path: str, frame: Frame, bounds: Bounds) -> Terrain:
                 dst_transform=rasterio.Affine(cell, 0, west - cell / 2, 0, -cell, south + (rows - 0.5) * cell),
                 resampling=rasterio.warp.Resampling.bilinear, tolerance=0.001,
             )  # fmt: skip
-    except (rasterio.errors.RasterioError, ProjError) as error:
-        what = str(error).splitlines()[0]
+    except InputError:
+        raise
+    except (rasterio.errors.RasterioError, ProjError, ValueError, TypeError, ArithmeticError, MemoryError) as error:
+        what = " ".join(str(error).split())[:120]
         raise InputError(f"{path}: is no elevation model that can be read ({what})") from None
     if np.isnan(out).all():
         raise InputError(f"{path}: is void all over the site; give an elevation model that covers it")

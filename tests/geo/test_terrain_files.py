@@ -1,5 +1,8 @@
 """Elevation models: the same ground from any file and coordinate system, and one line where there is none."""
 
+import contextlib
+from pathlib import Path
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -84,6 +87,37 @@ def test_feet_scales_and_declared_voids(tmp_path):
     assert np.isnan(terrain.height(np.array([0.0, 790.0])))
     with pytest.raises(InputError, match=r"dem\.tif: has a void in the site, at 50\.00"):
         refuse_void(terrain, box(*BOUNDS), frame)
+
+
+def test_mountains_in_feet_are_no_voids(tmp_path):
+    """12,000 feet are 3,658 m, which the Earth has; 60,000 m it has not."""
+    frame = Frame(5.0, 50.0)
+    utm = Transformer.from_crs("EPSG:4326", "EPSG:32631", always_xy=True).transform(5.0, 50.0)
+    heights = np.full((500, 500), 12_000.0)
+    heights[:200] = 60_000.0
+    path = write(tmp_path / "dem.tif", "EPSG:32631", utm, 5.0, 1.0, heights=heights)
+    with rasterio.open(path, "r+") as file:
+        file.units = ("ft",)
+    terrain = read_terrain(path, frame, BOUNDS)
+    assert terrain.height(np.array([0.0, 0.0])) == pytest.approx(3657.6)
+    assert np.isnan(terrain.height(np.array([0.0, 700.0])))
+
+
+def test_damaged_files_are_read_or_refused(tmp_path):
+    """A GeoTIFF with bytes changed, or cut, is read or refused, whatever GDAL meets in it."""
+    frame = Frame(5.0, 50.0)
+    utm = Transformer.from_crs("EPSG:4326", "EPSG:32631", always_xy=True).transform(5.0, 50.0)
+    whole = bytearray(
+        Path(write(tmp_path / "dem.tif", "EPSG:32631", utm, 20.0, 300.0, count=120, compress="lzw")).read_bytes()
+    )
+    rng = np.random.default_rng(0)
+    for n in range(60):
+        data = bytearray(whole)
+        for at in rng.integers(0, len(data) if n % 2 else 600, 4):
+            data[at] = rng.integers(256)
+        (tmp_path / "bad.tif").write_bytes(data[: len(data) if n % 3 else int(rng.integers(8, len(data)))])
+        with contextlib.suppress(InputError):
+            read_terrain(str(tmp_path / "bad.tif"), frame, BOUNDS)
 
 
 def test_ascii_grid_with_its_system_beside_it(tmp_path):
