@@ -22,6 +22,8 @@ from quarterdeck.geo.transit import Roadmap, shortest_path
 
 SHORTEST = 0.1  # of the spacing: shorter pieces of lines are not worth going to
 
+MOST_LINES = 5_000  # across a vehicle's part: their order is searched in the square of their number
+
 
 @dataclass(frozen=True, slots=True)
 class Swath:
@@ -133,6 +135,12 @@ def lay_lines(
     turn_cost = spacing if turn_cost is None else turn_cost
     if part.is_empty:
         return Lines((), (), angle or 0.0)
+    width = float(np.hypot(part.bounds[2] - part.bounds[0], part.bounds[3] - part.bounds[1]))
+    if width > MOST_LINES * spacing:
+        raise InputError(
+            f"spacing {spacing:g} m makes up to {width / spacing:,.0f} lines for a vehicle, more than {MOST_LINES:,}; "
+            f"at least {width / MOST_LINES:.3g} m works"
+        )
     if angle is None:
         angle = _best_angle(area, part, spacing, turn_cost, spread)
     pieces = _pieces(area, part, spacing, angle, spread)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
+from shapely.errors import ShapelyError
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
@@ -63,7 +64,7 @@ def read_cell(path: str | Path) -> Cell:
             names = [name for name, _ in pyogrio.list_layers(path)]
             head = _columns(pyogrio, path, "DSID", ("DSPM_CSCL", "DSID_EDTN", "DSID_UPDN"))[1]
             objects = {name: _objects(pyogrio, path, name) for name in names if name != "DSID" and name.isupper()}
-    except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError) as error:
+    except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, ShapelyError, ValueError) as error:
         raise InputError(f"{path}: cannot be read as an S-57 cell ({str(error).splitlines()[0][:120]})") from None
     scale = float(head["DSPM_CSCL"][0])
     return Cell(Path(path).name, scale if scale > 0 else float("inf"), head["DSID_EDTN"][0], head["DSID_UPDN"][0], objects)
@@ -176,7 +177,10 @@ def _frame(cells: Sequence[Cell], bounds: tuple[float, float, float, float] | No
 
 
 def _metres(frame: Frame, geometry: BaseGeometry) -> BaseGeometry:
-    return shapely.make_valid(shapely.transform(shapely.force_2d(geometry), frame.to_metres))
+    try:
+        return shapely.make_valid(shapely.transform(shapely.force_2d(geometry), frame.to_metres))
+    except ShapelyError as error:
+        raise InputError(f"the chart has a damaged {geometry.geom_type} ({error}); get the cell anew") from None
 
 
 def _polygons(geometry: BaseGeometry) -> bool:

@@ -45,8 +45,8 @@ class Terrain:
     def __post_init__(self) -> None:
         if self.heights.ndim != 2 or min(self.heights.shape) < 2 or np.isinf(self.heights).any():
             raise InputError("terrain: heights must be a table of at least 2 x 2 finite numbers")
-        if not (np.isfinite([*self.origin, self.cell]).all() and self.cell > 0):
-            raise InputError(f"terrain: origin {self.origin} and cell {self.cell} must be finite, the cell above 0")
+        if not (np.isfinite([*self.origin, self.cell]).all() and self.cell >= 0.01):
+            raise InputError(f"terrain: origin {self.origin} and cell {self.cell} must be finite, the cell at least 0.01 m")
 
     def height(self, xy: np.ndarray) -> np.ndarray:
         """Return (...) metres at (..., 2) places; NaN where the terrain is not known."""

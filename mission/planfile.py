@@ -178,7 +178,10 @@ def _headers(features: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _mission(name: str, header: dict[str, Any], features: list[dict[str, Any]]) -> Mission:
-    frame = Frame(*map(float, header["origin"]))
+    lon, lat = map(float, header["origin"])
+    if not (abs(lon) <= 180 and abs(lat) <= 90):
+        raise ValueError("its origin is no place on earth")
+    frame = Frame(lon, lat)
 
     def of(role: str) -> list[dict[str, Any]]:
         return [f for f in features if f["properties"]["role"] == role]
@@ -253,7 +256,7 @@ def _check_types(mission: Mission) -> None:
     if mission.method == "guards" and len(guards) != 1:
         raise ValueError("its guards are missing")
     for layer in guards:
-        places = all(isinstance(g, Point) for g in layer.geometries)
+        places = all(isinstance(g, Point) and not g.is_empty for g in layer.geometries)
         if not places or not all(fits(dict(p), GUARD) for p in layer.properties):
             raise TypeError("a guard is not what it must be")
 

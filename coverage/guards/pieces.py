@@ -27,7 +27,7 @@ def paper_guards(space: Space, reach: float) -> np.ndarray:
             guard = _guard(piece, space, radius, everywhere)
             if guard is not None:
                 guards.append(guard)
-            elif np.ptp(piece, axis=0).max() > SMALLEST * reach:
+            elif np.ptp(piece, axis=0).max() > SMALLEST * reach and space.reach.intersects(Polygon(piece)):
                 stack.extend(_halves(piece))
     return space.kept(np.array(guards, dtype=float))
 
