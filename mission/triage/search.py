@@ -33,6 +33,9 @@ class Search:
     missed: float
 
 
+MOST_CELLS = 500_000  # of the field's box: what sensors see along so long a path is still worked out in seconds
+
+
 @lru_cache(maxsize=64)
 def search_paths(
     field: MultiPolygon, free: MultiPolygon, starts: tuple[XY, ...], spacing: float, sees: float, ways: Ways
@@ -59,8 +62,16 @@ def search_paths(
 
 def _tours(room: MultiPolygon, starts: tuple[XY, ...], spacing: float) -> tuple[np.ndarray, ...] | None:
     """Return a tour for each UGV over the largest connected part of the room; the lanes halve until it has enough."""
+    box = (room.bounds[2] - room.bounds[0]) * (room.bounds[3] - room.bounds[1])
+    if box > MOST_CELLS * spacing**2:
+        raise InputError(
+            f"spacing {spacing:g} m makes {box / spacing**2:,.0f} cells of the field, more than {MOST_CELLS:,}; "
+            f"at least {(box / MOST_CELLS) ** 0.5:.3g} m works"
+        )
     for finer in range(5):
         step = spacing / 2**finer
+        if box > MOST_CELLS * step**2:
+            break
         grid = lay_grid(room, step, 0.0, (room.bounds[0], room.bounds[1]))
         parts, count = connected_parts(grid.hypervertices)
         sizes = [int((parts == p).sum()) for p in range(count)]

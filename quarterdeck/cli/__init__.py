@@ -6,6 +6,7 @@ from difflib import get_close_matches
 from importlib import import_module
 
 import click
+from click.shell_completion import CompletionItem
 
 from quarterdeck import __version__
 from quarterdeck.geo.errors import QuarterdeckError, one_line
@@ -51,6 +52,11 @@ class LazyGroup(click.Group):
         with formatter.section("Commands"):
             formatter.write_dl(sorted(self.verbs.items()))
 
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Return the commands that begin so, without importing any, and the group's own options."""
+        own = [CompletionItem(name, help=text) for name, text in self.verbs.items() if name.startswith(incomplete)]
+        return own or click.Command.shell_complete(self, ctx, incomplete)
+
     def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
         """Find the command, or suggest the nearest."""
         if args and args[0] not in self.verbs and not args[0].startswith("-"):
@@ -60,6 +66,27 @@ class LazyGroup(click.Group):
         return super().resolve_command(ctx, args)
 
 
+def _versions(ctx: click.Context, param: click.Parameter, asked: bool) -> None:  # noqa: ARG001
+    """Print the versions of what results depend on, and end."""
+    if not asked or ctx.resilient_parsing:
+        return
+    import platform
+    from importlib.metadata import PackageNotFoundError, version
+
+    import pyproj
+    import shapely
+
+    click.echo(f"quarterdeck, version {__version__}")
+    inside = {"shapely": f" (GEOS {shapely.geos_version_string})", "pyproj": f" (PROJ {pyproj.proj_version_str})"}
+    click.echo(f"python {platform.python_version()}")
+    for name in ("numpy", "scipy", "numba", "shapely", "pyproj", "pybullet"):
+        try:
+            click.echo(f"{name} {version(name)}{inside.get(name, '')}")
+        except PackageNotFoundError:
+            click.echo(f"{name} is not installed")
+    ctx.exit()
+
+
 @click.command(
     cls=LazyGroup,
     package="quarterdeck.cli",
@@ -67,7 +94,8 @@ class LazyGroup(click.Group):
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="Exit status: 0 done; 1 the mission is infeasible or the verdict fails; 2 wrong input or usage; 130 stopped.",
 )
-@click.version_option(__version__, prog_name="quarterdeck")
+@click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_versions,
+              help="Show the versions of Quarterdeck and of what its results depend on.")  # fmt: skip
 def group() -> None:
     """Plan, prove and export missions for fleets on land, at sea and in the air."""
 

@@ -19,6 +19,7 @@ from quarterdeck.cli.output import (
     print_cut,
     print_reason,
     seed_option,
+    tell_compiling,
     time_limit_option,
 )
 from quarterdeck.cli.parameters import Choice, Numbers, Real
@@ -104,6 +105,7 @@ def command(
     from quarterdeck.api import assign, plan_text, read_scenario
     from quarterdeck.mission.twin import map_scenario
 
+    tell_compiling()
     scenario = read_scenario(site)
     twin = None
     if map_file is not None:

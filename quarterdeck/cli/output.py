@@ -76,6 +76,38 @@ def digest(file: str) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
+def tell_compiling() -> None:
+    """From now on tell whoever sits before it that hot loops are being compiled, if they are, and how long that took."""
+    if not sys.stderr.isatty():
+        return
+    from time import monotonic
+
+    from numba.core import event
+
+    class Told(event.Listener):
+        depth, seconds, began = 0, 0.0, 0.0
+
+        def on_start(self, _: Any) -> None:
+            if not self.depth and not self.seconds:
+                click.echo("compiling the hot loops: once after installation, up to a minute", err=True)
+            self.began = self.began if self.depth else monotonic()
+            self.depth += 1
+
+        def on_end(self, _: Any) -> None:
+            self.depth -= 1
+            self.seconds += 0.0 if self.depth else monotonic() - self.began
+
+    told = Told()
+    event.register("numba:compile", told)
+
+    def close() -> None:
+        event.unregister("numba:compile", told)
+        if told.seconds:
+            click.echo(f"compiled in {told.seconds:.0f} s, and kept for the next runs", err=True)
+
+    click.get_current_context().call_on_close(close)
+
+
 def console() -> Console:
     """Return the console on standard error; brackets and colons in names and reasons are just that, no markup."""
     return Console(stderr=True, highlight=False, markup=False, emoji=False)

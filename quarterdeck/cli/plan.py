@@ -12,6 +12,7 @@ from quarterdeck.cli.output import (
     output_option,
     print_figures,
     seed_option,
+    tell_compiling,
     terrain_option,
     time_limit_option,
     tolerance_option,
@@ -74,6 +75,7 @@ def command(
     """Plan a mission that covers the areas of SITE, a GeoJSON file (- reads standard input), and write it as a PLAN."""
     from quarterdeck.api import default_method, plan, plan_text, read_scenario
 
+    tell_compiling()
     given = {name: value for name, value in options.items() if value is not None}
     scenario = read_scenario(site)
     method = method or default_method(scenario)

@@ -65,6 +65,7 @@ def command(
     from quarterdeck.mission.planfile import plan_text, read_plan
     from quarterdeck.mission.replan import replan
 
+    tell_compiling()
     mission = read_plan(plan)
     since: dict[str, float] = {}
     for item in _ids(lost):

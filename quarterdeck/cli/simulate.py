@@ -18,6 +18,7 @@ from quarterdeck.cli.output import (
     not_there,
     print_reason,
     seed_option,
+    tell_compiling,
     time_limit_option,
 )
 from quarterdeck.cli.parameters import Choice, Real
@@ -139,6 +140,7 @@ def command(
     """
     from quarterdeck.geo.deadline import limited
 
+    tell_compiling()
     with limited(time_limit, interruptible=True) as limit:
         mission, run = execute(**options)
     if run.map is not None:

@@ -17,6 +17,7 @@ from quarterdeck.cli.output import (
     output_option,
     print_reason,
     seed_option,
+    tell_compiling,
     time_limit_option,
 )
 from quarterdeck.cli.parameters import Choice, Real
@@ -132,6 +133,7 @@ def command(site: str | None, generate: int | None, output: str, force: bool, se
 
     UGVs search for casualties, a UAV carries their reports to a medic, the medic treats the most urgent first.
     """
+    tell_compiling()
     scenario = _scenario(site, options)
     if generate is not None:
         return _generate(scenario, generate, seed, output, force, options)
