@@ -15,6 +15,7 @@ from quarterdeck.cli.output import (
     output_option,
     print_figures,
     print_reason,
+    tell_compiling,
     time_limit_option,
 )
 from quarterdeck.cli.parameters import Real
