@@ -17,7 +17,7 @@ from quarterdeck.mission.progress import Progress, planned_progress
 from quarterdeck.mission.remaining import remaining_parts
 from quarterdeck.mission.served import served_tasks
 from quarterdeck.mission.survey_recovery import VISITED
-from quarterdeck.mission.track import Track
+from quarterdeck.mission.track import Track, energy_used
 
 FINE = 1e-3  # spacings: tracks are thinned by no more
 JUST = 10.0  # s: what is just done, or about to be, may count as either
@@ -49,11 +49,9 @@ def recorded_progress(
         on = follow(mission, track)
         home = track.arrived <= last and int(on.leg[-1]) == len(route.waypoints) - 1
         along[vehicle.id] = route.duration if home else planned_time(vehicle, route, track, on)
-        used = track.energy[np.isfinite(track.energy)]
-        if not len(used):
-            notes.append(f"{vehicle.id}: no energy in its log; it has used what the plan says for the way so far")
-            used = np.array([route.energy * along[vehicle.id] / route.duration if route.duration else 0.0])
-        energy[vehicle.id] = float(used[-1])
+        if not np.isfinite(track.energy).any():
+            notes.append(f"{vehicle.id}: no energy in its log; reckoned from what {vehicle.model.name} draws at its speed")
+        energy[vehicle.id] = float(energy_used(vehicle, track)[-1])
         if mission.spacing is not None:
             lines += surveyed_lines(route, track, on, FINE * mission.spacing)
     served = frozenset(served_tasks(mission, known))

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.mission import Route
@@ -73,13 +74,40 @@ def set_off(vehicle: Vehicle, track: Track) -> float:
 
 
 def at_rest(track: Track, stay: slice, *, last: bool) -> float:
-    """Return when in a stay the vehicle was last at rest, or first to stay so to its end; its border if it never was."""
+    """Return when in a stay the vehicle was last at rest, or first to stay so to its end; its border if it never was.
+
+    Where positions scatter, by their second differences, means over MOMENT are looked at, and as much scatter is no motion.
+    """
     xyz, time = np.column_stack([track.x, track.y, np.nan_to_num(track.z)])[stay], track.time[stay]
     if last:  # seen backwards, it is to come to rest
         xyz, time = xyz[::-1], -time[::-1]
-    bend = xyz[2:] - 2 * xyz[1:-1] + xyz[:-2]
-    noise = float(np.median(np.abs(bend))) * 1.5 / np.sqrt(6.0) if len(bend) else 0.0
+    bend = np.diff(xyz[:, :2], n=2, axis=0)
+    scatter = 1.5 * float(np.median(np.abs(bend))) / np.sqrt(6.0) if len(bend) else 0.0
+    if scatter > CREEP:
+        count = min(max(3, round(MOMENT / float(np.median(np.diff(time))))), len(time))
+        xyz = uniform_filter1d(xyz, count, axis=0, mode="nearest")
+        scatter *= np.sqrt(2.0 / count)
     later = np.minimum(np.searchsorted(time, time + MOMENT), len(time) - 1)
-    moving = np.flatnonzero(np.linalg.norm(xyz[later] - xyz, axis=1) >= CREEP + 5.0 * noise)
+    moving = np.flatnonzero(np.linalg.norm(xyz[later] - xyz, axis=1) >= CREEP + 6.0 * scatter)
     at = min(int(moving[-1]) + 1, len(time) - 1) if len(moving) else 0
     return -float(time[at]) if last else float(time[at])
+
+
+def pace(track: Track) -> np.ndarray:
+    """Return (n,) speeds in m/s: as logged, or else over MOMENT."""
+    sure = np.isfinite(track.speed)
+    if sure.any():
+        return np.interp(track.time, track.time[sure], track.speed[sure])
+    before, after = track.time - MOMENT / 2, track.time + MOMENT / 2
+    x, y = (np.interp(after, track.time, a) - np.interp(before, track.time, a) for a in (track.x, track.y))
+    return np.hypot(x, y) / np.maximum(np.minimum(after, track.time[-1]) - np.maximum(before, track.time[0]), 1e-9)
+
+
+def energy_used(vehicle: Vehicle, track: Track) -> np.ndarray:
+    """Return (n,) Wh used since the mission's start: as logged, or else what the model draws at its pace."""
+    sure = np.isfinite(track.energy)
+    if sure.any():
+        return np.interp(track.time, track.time[sure], track.energy[sure])
+    model = vehicle.model
+    power = model.power_idle + (model.power_cruise - model.power_idle) * (pace(track) / model.speed) ** model.power_exponent
+    return np.r_[0.0, np.cumsum(power[1:] * np.diff(track.time))] / 3600.0

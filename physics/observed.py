@@ -15,7 +15,7 @@ from quarterdeck.mission.matching import Followed, follow, off_legs
 from quarterdeck.mission.mission import Mission, Route
 from quarterdeck.mission.recorded import progress_state, recorded_progress
 from quarterdeck.mission.served import served_tasks
-from quarterdeck.mission.track import NEAR, Track
+from quarterdeck.mission.track import NEAR, Track, energy_used, pace
 from quarterdeck.mission.tracks import Record
 from quarterdeck.physics.paths import LEGS, vehicle_limits
 from quarterdeck.physics.report import Report, measure
@@ -145,8 +145,7 @@ def _columns(
         cross = np.where(span[:, 0] * off[:, 1] < span[:, 1] * off[:, 0], -cross, cross)
     # Off the line through the leg, as the simulation has it; but far beyond its ends off the leg.
     cross = np.where(beyond <= zone, cross, np.hypot(cross, beyond))
-    pace = np.hypot(np.gradient(x, time), np.gradient(y, time)) if len(time) > 1 else np.zeros(len(time))
-    speed = _filled(time, track, track.speed, pace)
+    speed = np.interp(time, track.time, pace(track))
     waiting = np.array([w.hold > 0 for w in route.waypoints])
     holding = (speed < STILL) & (waiting[leg] | waiting[np.maximum(leg - 1, 0)])
     turning = ((beyond > -zone) & (beyond <= zone)) | holding | home
@@ -162,7 +161,7 @@ def _columns(
         "z": z,
         "heading": _heading(track, time),
         "speed": np.where(home, 0.0, speed),
-        "energy": _energy(vehicle, track, time, speed),
+        "energy": np.interp(time, track.time, energy_used(vehicle, track)),
         "cross": np.where(holding | home, 0.0, cross),
         "leg": leg,
         "kind": np.where(known | home, kind, UNKNOWN),
@@ -195,11 +194,6 @@ def _known(when: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray
     return np.interp(when, time[sure], values[sure])
 
 
-def _filled(when: np.ndarray, track: Track, values: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
-    """Return the log's values at `when`, or, where it has none, others."""
-    return _known(when, track.time, values) if np.isfinite(values).any() else otherwise
-
-
 def _heading(track: Track, time: np.ndarray) -> np.ndarray:
     """Return (t,) radians: as logged, or else the course over at least HULL metres."""
     if np.isfinite(track.heading).any():
@@ -213,14 +207,3 @@ def _heading(track: Track, time: np.ndarray) -> np.ndarray:
     course = np.unwrap(np.arctan2(np.diff(track.y[kept]), np.diff(track.x[kept])))
     middle = (track.time[kept[:-1]] + track.time[kept[1:]]) / 2
     return np.interp(time, middle, course)
-
-
-def _energy(vehicle: Vehicle, track: Track, time: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """Return (t,) Wh used: as logged, or else what the model draws at its speed."""
-    if np.isfinite(track.energy).any():
-        return _known(time, track.time, track.energy)
-    under = (time >= track.time[0]) & (time <= track.time[-1])
-    model = vehicle.model
-    share = np.maximum(speed / model.speed, 0.0) ** model.power_exponent
-    power = np.where(under, model.power_idle + (model.power_cruise - model.power_idle) * share, 0.0)
-    return np.r_[0.0, np.cumsum(power[1:] * np.diff(time))] / 3600.0

@@ -101,3 +101,22 @@ def test_start_by_setting_off(driven, write_log, tmp_path):
         write_log(tmp_path / f"{vehicle.id}.gpx", rows_of(mission, run.trace, i))
     record = read_tracks(mission, [str(p) for p in sorted(tmp_path.iterdir())])
     assert record.start == pytest.approx(EPOCH, abs=3.0)
+
+
+def test_receivers_that_scatter(driven, write_log, tmp_path):
+    """A fix a second, half a metre off at random: the mission begins and ends within a few seconds of when it did."""
+    mission, run = driven("otter")
+    random = np.random.default_rng(1)
+    for i, vehicle in enumerate(mission.vehicles):
+        rows = rows_of(mission, run.trace, i, every=10, wait=120.0)
+        off = random.normal(0.0, 0.5, (len(rows["time"]), 2)) / 111_000
+        rows |= {"lon": rows["lon"] + off[:, 0] / np.cos(np.radians(38.9)), "lat": rows["lat"] + off[:, 1]}
+        write_log(tmp_path / f"{vehicle.id}.gpx", rows)
+    record = read_tracks(mission, [str(p) for p in sorted(tmp_path.iterdir())])
+    assert record.start == pytest.approx(EPOCH, abs=6.0)
+    report = report_tracks(mission, record).report
+    for mine, theirs in zip(report.vehicles, run.report.vehicles, strict=True):
+        assert mine.finished
+        assert mine.time == pytest.approx(theirs.time, abs=10.0)
+        assert mine.legs.p95 == pytest.approx(theirs.legs.p95, abs=1.0)
+    assert report.figures["coverage_driven"] == pytest.approx(run.report.figures["coverage_driven"], abs=0.02)
