@@ -45,8 +45,9 @@ def guards_from_now(
     if target.area <= TOLERANCE * whole.target.area:
         target = shapely.MultiPolygon()
     space = replace(whole, target=target)
-    guards, owners = _left(mission, space, mesh, team, seen)
-    guards, hidden = mend(space, mesh, guards, float(ranges.min()))
+    same = _same_needs(mission, scenario, float(ranges.min()))
+    guards, owners = _left(mission, space, mesh, team, seen, all_needed=same)
+    guards, hidden = (guards, shapely.MultiPolygon()) if same else mend(space, mesh, guards, float(ranges.min()))
     owners += [None] * (len(guards) - len(owners))
     net = network(space.reach, guards, team.starts)
     start = Tours(guards, net, _shared(net, owners, mission, team), (), (), np.zeros(len(ranges)), 0.0)
@@ -62,6 +63,22 @@ def guards_from_now(
         seed=seed,
         layers=(_with_seen(after.layers[0], seen), *after.layers[1:]),
         reasons=(*reasons, *after.reasons),
+    )
+
+
+def _same_needs(mission: Mission, scenario: Scenario, reach: float) -> bool:
+    """Whether each guard that is left is needed, and no more are: the site is as it was, all of it was to be seen, by
+    guards none of which was spare, and nobody sees less far.
+    """
+    layer = next(layer for layer in mission.layers if layer.name == "guards")
+    now, then = scenario.site, mission.site
+    return (
+        mission.feasible
+        and mission.parameters.get("mode") != "paper"
+        and now.obstacles == then.obstacles
+        and [a.polygon for a in now.areas] == [a.polygon for a in then.areas]
+        and all(p["seen"] or p["vehicle"] is not None for p in layer.properties)
+        and all(p["range"] <= reach * (1 + 1e-9) for p in layer.properties)
     )
 
 
@@ -85,8 +102,7 @@ def _confirmed(mission: Mission, scenario: Scenario, served: frozenset[str]) -> 
     One that an obstacle stood near that is gone does not count any more: it has not seen what the obstacle hid.
     """
     layer = next(layer for layer in mission.layers if layer.name == "guards")
-    here = {o.id for o in scenario.site.obstacles}
-    gone = shapely.union_all([o.polygon for o in mission.site.obstacles if o.id not in here])
+    gone = shapely.union_all([o.polygon for o in mission.site.obstacles if o not in scenario.site.obstacles])
     return {
         i: (place, float(p["range"]))
         for i, (place, p) in enumerate(zip(layer.geometries, layer.properties, strict=True))
@@ -119,7 +135,13 @@ def _unseen(space: Space, mesh: Triangulation, seen: Mapping[int, tuple[shapely.
 
 
 def _left(
-    mission: Mission, space: Space, mesh: Triangulation, team: Team, seen: Mapping[int, tuple[shapely.Point, float]]
+    mission: Mission,
+    space: Space,
+    mesh: Triangulation,
+    team: Team,
+    seen: Mapping[int, tuple[shapely.Point, float]],
+    *,
+    all_needed: bool,
 ) -> tuple[np.ndarray, list[str | None]]:
     """Return the guards that are still needed, and the vehicle that was to pass each; in the order of the plan's tours."""
     layer = next(layer for layer in mission.layers if layer.name == "guards")
@@ -127,8 +149,10 @@ def _left(
     inside = shapely.contains_xy(space.reach, places[:, 0], places[:, 1])
     turns = [(p["turn"] is None, p["turn"] or 0, i) for i, p in enumerate(layer.properties)]
     order = [i for _, _, i in sorted(turns) if inside[i] and i not in seen]
-    views = visibility_polygons(mesh, places[order], float(team.ranges.min()))
-    kept = [i for i, drop in zip(order, needless(space.target, views), strict=True) if not drop] if order else []
+    kept = order
+    if order and not all_needed:
+        views = visibility_polygons(mesh, places[order], float(team.ranges.min()))
+        kept = [i for i, drop in zip(order, needless(space.target, views), strict=True) if not drop]
     return places[kept].reshape(-1, 2), [layer.properties[i]["vehicle"] for i in kept]
 
 

@@ -43,7 +43,13 @@ def test_narrow_u_turns_become_curves(gap, radius):
     assert len(points) == len(legs) == len(path.pace)
     assert curvature(points) > 0.9 * radius or "turn" not in legs
     assert curvature(driven(points, radius)) > 0.9 * radius or "turn" in legs
-    assert np.allclose(points[-1], line[-1])
+    assert np.allclose(points[0], line[0])
+    ends = points[-2:]  # it ends on the next line, in its direction
+    assert np.allclose(ends[1], line[-1])
+    assert math.isclose(abs(math.atan2(*(ends[1] - ends[0])[::-1])), math.pi, abs_tol=1e-6)
+    track = LineString(driven(points, radius))
+    assert track.distance(Point(150, 0)) < 1e-6
+    assert track.distance(Point(150, gap)) < 1e-6
     assert ("turn" in legs) == (2 * radius > gap + 1e-9)
 
 
@@ -52,5 +58,6 @@ def test_no_room_is_told():
     channel = MultiPolygon([box(-1, -1, 101, 10.5)])
     line = np.array([[0, 0], [100, 0], [100, 10], [0, 10.0]])
     path = with_turns(line, ["start", "survey", "survey", "survey"], 80.0, channel)
-    assert path.stops.any()
+    assert path.stops.tolist() == [False, True, True, False]
     assert np.array_equal(path.points, line)
+    assert path.legs == ["start", "survey", "survey", "survey"]

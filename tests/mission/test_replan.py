@@ -9,7 +9,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely import Point, box
+from shapely import box
 
 from quarterdeck.coverage.metrics import swath
 from quarterdeck.geo.errors import InputError
@@ -125,5 +125,16 @@ def test_refusals(changes, words):
 
 
 def test_start_inside():
-    """The helper geometry of these tests is as they think: the wreck lies in the sea area."""
-    assert plan("west_ant_island").site.area.contains(Point(700, 850))
+    """A vehicle in what appears is refused by name; one within its clearance of it goes straight out, and is clear then."""
+    before = plan("west_ant_island")
+    progress = planned_progress(before, 3000.0)
+    x, y, _ = progress.positions["usv-2"]
+    with pytest.raises(InputError, match="vehicle 'usv-2' is inside obstacle 'wreck'"):
+        replan(before, progress, Changes(obstacles=(Obstacle("wreck", box(x - 5, y - 5, x + 5, y + 5)),)))
+    near = 0.4 * before.vehicle("usv-2").clearance
+    beside = Obstacle("wreck", box(x + near, y - 20, x + near + 40, y + 20))
+    after = replan(before, progress, Changes(obstacles=(beside,)))
+    route = next(r for r in after.routes if r.vehicle == "usv-2")
+    assert np.allclose(route.xyz[0, :2], (x, y))
+    assert shapely.LineString(route.xyz[:, :2]).distance(beside.polygon) >= near - 1e-6
+    assert shapely.LineString(route.xyz[1:, :2]).distance(beside.polygon) >= before.vehicle("usv-2").clearance - 1e-3
