@@ -1,13 +1,16 @@
 """What has happened of a mission so far: where everyone is, what is covered and served, what it has used."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from shapely import LineString
 
 from quarterdeck.geo.errors import InputError
-from quarterdeck.mission.mission import Mission, Route, unbroken
+from quarterdeck.mission.mission import Layer, Mission, Route, unbroken
 from quarterdeck.mission.timing import RESERVE
+
+SURVEYED = "surveyed"  # the layer of what was surveyed before a plan began
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +71,13 @@ def _place(route: Route, time: float) -> tuple[int, tuple[float, float, float]]:
         part = (time - departures[reached - 1]) / (arrivals[reached] - departures[reached - 1])
         x, y, z = xyz[reached - 1] + part * (xyz[reached] - xyz[reached - 1])
     return reached, (float(x), float(y), float(z))
+
+
+def with_surveyed(mission: Mission, tracks: Sequence[np.ndarray]) -> Layer:
+    """Return the layer `surveyed`: the (n, 2) lines that were surveyed before this plan began, by earlier plans too."""
+    before = next((layer.geometries for layer in mission.layers if layer.name == SURVEYED), ())
+    lines = {line.wkb: line for line in (*before, *(LineString(t) for t in tracks if len(t) > 1))}
+    return Layer(SURVEYED, tuple(lines.values()), tuple({"stroke": "#999999", "stroke-width": 1} for _ in lines))
 
 
 def surveyed(route: Route, reached: int, position: tuple[float, float, float]) -> list[np.ndarray]:

@@ -10,8 +10,8 @@ from quarterdeck.geo.scenario import Scenario, Site, Task, Vehicle
 from quarterdeck.mission.changes import Changes as Changes
 from quarterdeck.mission.changes import changed_site, check_changes
 from quarterdeck.mission.guard_recovery import guards_from_now, with_confirmed
-from quarterdeck.mission.mission import Mission, Route, Waypoint
-from quarterdeck.mission.progress import Progress, energy_left
+from quarterdeck.mission.mission import Layer, Mission, Route, Waypoint
+from quarterdeck.mission.progress import Progress, energy_left, with_surveyed
 from quarterdeck.mission.recorded import as_planned
 from quarterdeck.mission.survey_recovery import survey_from_now
 from quarterdeck.mission.task_recovery import assign_from_now, tasks_left
@@ -133,10 +133,18 @@ def _rest(mission: Mission, progress: Progress) -> Mission:
         vehicles=vehicles,
         lost=lost,
         parameters=told,
+        layers=_with_surveyed_layer(mission, progress),
         tasks=tasks_left(mission, mission.tasks, progress, {v.id for v in vehicles}) if mission.tasks else (),
         figures=dict(mission.figures) | left,
         reasons=(*(r for r in mission.reasons if "short by" not in r), *reasons),
     )
+
+
+def _with_surveyed_layer(mission: Mission, progress: Progress) -> tuple[Layer, ...]:
+    if mission.spacing is None:
+        return mission.layers
+    done = with_surveyed(mission, progress.tracks)
+    return (*(layer for layer in mission.layers if layer.name != done.name), *((done,) if done.geometries else ()))
 
 
 def _route_left(route: Route, progress: Progress, vehicle: Vehicle) -> Route:

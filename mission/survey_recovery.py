@@ -16,7 +16,7 @@ from quarterdeck.mission.changes import Changes
 from quarterdeck.mission.cover import cover, roadmaps, trackable
 from quarterdeck.mission.lines import plan_lines
 from quarterdeck.mission.mission import Layer, Mission, Route, unbroken, undone
-from quarterdeck.mission.progress import Progress
+from quarterdeck.mission.progress import Progress, with_surveyed
 from quarterdeck.mission.remaining import clipped, remaining_parts
 from quarterdeck.mission.routes import line_routes, survey_tracks
 from quarterdeck.mission.sharing import Line, Shares, Team, line_of, share_out, team_of, times
@@ -44,7 +44,8 @@ def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, ch
     survey = _shared(mission, scenario, roads, own, released)
     left = [line.points for line in survey.left]
     ahead = [t for v, r in zip(scenario.vehicles, survey.routes, strict=True) for t in survey_tracks(v, r)]
-    driven = _swath([*progress.tracks, *ahead], spacing)
+    done = with_surveyed(mission, progress.tracks)
+    driven = _swath([*(np.array(line.coords) for line in done.geometries), *ahead], spacing)
     site = scenario.site.coverable
     gaps = as_multipolygon(_swath(left, spacing).intersection(site).difference(driven))
     rim = as_multipolygon(_swath(cut, spacing).intersection(site).difference(driven).difference(gaps))
@@ -65,7 +66,7 @@ def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, ch
         },
         bounds={},
         reasons=(*told, *survey.reasons),
-        layers=_layers(left, gaps, rim),
+        layers=(*_layers(left, gaps, rim), *((done,) if done.geometries else ())),
     )
 
 

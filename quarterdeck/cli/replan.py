@@ -62,7 +62,7 @@ def command(
     """Write the mission of PLAN from now on: what is done stays done, survivors go on from where they are and come home."""
     from quarterdeck.api import within
     from quarterdeck.geo.errors import InputError
-    from quarterdeck.mission.changes import Changes, read_changes
+    from quarterdeck.mission.changes import Changes, check_changes, read_changes
     from quarterdeck.mission.planfile import plan_text, read_plan
     from quarterdeck.mission.replan import replan
 
@@ -79,6 +79,7 @@ def command(
     changes = Changes(lost=frozenset(since), since=since, gone=gone_ids, withdrawn=withdrawn_ids)
     for source in (add, changed):
         changes |= read_changes(source, mission) if source else Changes()
+    check_changes(mission, changes)
     stopped = {v: changes.since.get(v, math.inf) for v in changes.lost}
     so_far = _progress(mission, time, tracks, start, state, stopped)
     after = within(time_limit, lambda: replan(mission, so_far, changes, seed=seed))
