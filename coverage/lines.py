@@ -175,7 +175,8 @@ def _pieces(
     """Return the (n, 2, 2) pieces of the lines at `angle` that survey `part`, line after line."""
     cos, sin = np.cos(angle), np.sin(angle)
     turn = np.array([[cos, -sin], [sin, cos]])
-    inner = area.buffer(-TOLERANCE * spacing, join_style="mitre")
+    least = spacing if spread is None else float(spread.widths.min())
+    inner = area.buffer(-TOLERANCE * least, join_style="mitre")
     space, wanted = (shapely.transform(g, lambda xy: xy @ turn) for g in (inner, part))
     left, bottom, right, top = shapely.total_bounds([space, wanted])
     _, bottom, _, top = wanted.bounds
@@ -194,7 +195,7 @@ def _pieces(
     reach = shapely.linestrings(ways[bounds[:, 2] > bounds[:, 0]])  # an empty strip's bounds are no numbers
     merged = shapely.get_parts(shapely.line_merge(shapely.union_all(reach))) if len(reach) else reach
     kept = shapely.get_parts(shapely.intersection(merged, space))
-    kept = kept[(shapely.get_type_id(kept) == 1) & (shapely.length(kept) >= SHORTEST * spacing)]
+    kept = kept[(shapely.get_type_id(kept) == 1) & (shapely.length(kept) >= SHORTEST * least)]
     ends = np.stack([shapely.get_coordinates(shapely.get_point(kept, n)) for n in (0, -1)], axis=1).reshape(-1, 2, 2)
     ends = np.sort(ends, axis=1)  # left to right: the two differ in x alone
     order = np.lexsort((ends[:, 0, 0], np.searchsorted(lows, ends[:, 0, 1], side="right")))

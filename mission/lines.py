@@ -89,7 +89,7 @@ def plan_lines(
     del figures["turns"], figures["turns_per_1000_m2"], figures["cell_poc"]  # of lanes of a grid; there is none here
     if sounded:  # one width does not say what is covered
         del figures["overlap"]
-        figures |= seen(scenario, vehicles, routes)
+        figures |= seen(scenario, area, routes)
         figures["poc"] = figures.pop("seafloor_coverage", figures["poc"])
     figures |= {
         "lines": sum(len(lines.swaths) for lines in laid),

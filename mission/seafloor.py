@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from quarterdeck.coverage.spread import Spread
 from quarterdeck.geo.depths import depths_at
-from quarterdeck.geo.scenario import Scenario, Vehicle
+from quarterdeck.geo.scenario import Scenario
 from quarterdeck.geo.sensors import follows_depth, sonar_swath
 from quarterdeck.mission.mission import Route
 
@@ -45,12 +45,13 @@ def bottom(scenario: Scenario, area: BaseGeometry) -> tuple[np.ndarray, np.ndarr
     return places, depths_at(soundings, places)
 
 
-def seen(scenario: Scenario, vehicles: Sequence[Vehicle], routes: Sequence[Route]) -> dict[str, Any]:
+def seen(scenario: Scenario, reach: BaseGeometry, routes: Sequence[Route]) -> dict[str, Any]:
     """Return as figures what survey legs see of the seafloor to be covered, from their places and the soundings alone.
 
-    `seafloor_coverage` is the part of the places looked at that lies within a fan; `least_overlap`, of places farther from
-    any border than a half fan is wide, the least part by which a half fan reaches beyond what it has to see.
+    `seafloor_coverage` is the part of the places looked at that lies within a fan; `least_overlap` the least part by which
+    a half fan sees too far, of places farther than a half fan and a turn from the border of where tracks may lie, `reach`.
     """
+    vehicles = scenario.vehicles
     if not all(follows_depth(v.sensor) for v in vehicles):
         return {}
     places, depths = bottom(scenario, scenario.site.coverable)
@@ -69,6 +70,8 @@ def seen(scenario: Scenario, vehicles: Sequence[Vehicle], routes: Sequence[Route
             beside = (along >= -0.01) & (along <= length + 0.01)
             use[beside] = np.minimum(use[beside], np.abs(abeam[beside]) / half[beside])
     fan = max(math.tan(math.radians(v.sensor.parameters["angle"] / 2)) for v in vehicles if v.sensor is not None)
-    inner = shapely.distance(scenario.site.coverable.boundary, shapely.points(places)) > depths * fan
+    turn = 3 * max(v.turn_radius for v in vehicles)  # what turns between close lines take off their ends
+    spots = shapely.points(places)
+    inner = shapely.intersects(reach, spots) & (shapely.distance(reach.boundary, spots) > depths * fan + turn)
     worst = float(use[inner].max()) if inner.any() else 1.0
     return {"seafloor_coverage": float((use <= 1.0).mean()), "least_overlap": max(0.0, 1.0 - worst)}
