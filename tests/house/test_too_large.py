@@ -1,0 +1,42 @@
+"""What is larger than the tool can hold is refused at once, in one line, with what would work."""
+
+import re
+import resource
+import time
+from pathlib import Path
+
+import pytest
+
+from quarterdeck.cli import main
+
+DATA = Path(__file__).parents[2] / "data"
+CASES = {
+    "stc": ["plan", "west_ant_island", "--method", "stc", "--spacing", "0.5"],
+    "lines": ["plan", "west_ant_island", "--method", "lines", "--spacing", "0.5"],
+    "guards": ["plan", "west_ant_island", "--method", "guards", "--range", "0.5"],
+    "map": ["assign", "inspection_hall", "--resolution", "0.001"],
+    "triage": ["triage", "triage_drill", "--spacing", "0.01"],
+}
+
+
+@pytest.mark.parametrize("case", ["stc", "lines", "guards", "map", "triage"])
+def test_too_fine_is_refused_with_what_works(case, tmp_path, capsys):
+    """A spacing, range or resolution that makes too much costs little, and is told with the way out."""
+    verb, site, *options = CASES[case]
+    if case == "triage":  # its site may give the spacing itself
+        text = (DATA / f"{site}.geojson").read_text()
+        path = tmp_path / "site.geojson"
+        path.write_text(re.sub(r'"role": "area"', '"role": "area", "spacing": 0.01', text))
+    else:
+        path = DATA / f"{site}.geojson"
+    start, held = time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(SystemExit) as stop:
+        main([verb, str(path), *options, "-o", str(tmp_path / "out.geojson")])
+    assert stop.value.code == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert len(told.err.strip().splitlines()) == 1
+    assert re.search(r"at least [\d.e+-]+ m works|give a longer range", told.err), told.err
+    assert not (tmp_path / "out.geojson").exists()
+    assert time.process_time() - start < 20
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - held < 500_000
