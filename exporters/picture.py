@@ -47,7 +47,7 @@ def picture(
     chart = figure.add_axes((0.055, 0.055, 0.615, 0.875))
     panel = figure.add_axes((0.685, 0.03, 0.30, 0.90))
     palette = colours(len(mission.routes))
-    _view(chart, mission, width / height)
+    _view(chart, mission, trace, width / height)
     _site(chart, mission, strange)
     _layers(chart, mission, palette)
     _routes(chart, mission, palette, faint=trace is not None)
@@ -66,9 +66,10 @@ def picture(
     return buffer.getvalue()
 
 
-def _view(chart: Axes, mission: Mission, aspect: float) -> None:
-    """Set the limits: all routes and the areas, with a margin, filling the frame; far parts of the site are cut."""
+def _view(chart: Axes, mission: Mission, trace: Trace | None, aspect: float) -> None:
+    """Set the limits: all routes, tracks and areas, with a margin, filling the frame; far parts of the site are cut."""
     points = [route.xyz[:, :2] for route in mission.routes]
+    points += [np.column_stack([trace.x.ravel(), trace.y.ravel()])] if trace is not None else []
     points += [shapely.get_coordinates(area.polygon) for area in mission.site.areas]
     points += [np.array([task.position for task in mission.tasks]).reshape(-1, 2)]
     if not any(len(p) for p in points):

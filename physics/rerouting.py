@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import binary_dilation, distance_transform_edt
 from shapely import LineString, MultiPolygon
 
 from quarterdeck.geo.gridpath import find_ways, nearest_free
@@ -63,6 +63,7 @@ class Rerouting:
         self.tried = np.full(len(vehicles), -np.inf)
         self.barred = np.full(len(vehicles), np.inf)  # since when there is no way
         self.stuck: set[int] = set()  # those that have no way
+        self.strange = {-1: np.zeros((0, 0), bool)}  # of the common map (-1), and of those of robots that are not heard
         self.free: dict[float, np.ndarray] = {}
 
     def begin(self, fresh: Iterable[int]) -> None:
@@ -111,6 +112,30 @@ class Rerouting:
             away = np.hypot(*(ends[:, None] - believed[others, :2]).transpose(2, 0, 1))
             told[(away < size[others]).any(axis=1)] = np.nan
             fuse(self.map_of(i), believed[i], angles, told, reach)
+
+        self.strange = {-1: self._strange(self.shared), **{i: self._strange(e) for i, e in self.apart.items()}}
+
+    def _strange(self, evidence: Evidence) -> np.ndarray:
+        """Return (rows, cols) bool: the cell is of something that the plan's map does not have, or beside it."""
+        found = (evidence.values > WALL) & self._clear_of(KNOWN)
+        return binary_dilation(found, iterations=2) if found.any() else found
+
+    def mapped(self, believed: np.ndarray, angles: np.ndarray, ranges: np.ndarray) -> np.ndarray:
+        """Return the scans (n, b) without the echoes of what was found: a filter that believes the map had better not try
+        to explain them.
+        """
+        if not any(s.any() for s in self.strange.values()):
+            return ranges
+        out = ranges.copy()
+        for n, i in enumerate(self.lidars.tolist()):
+            strange, heard = self.strange.get(i, self.strange[-1]), np.flatnonzero(np.isfinite(ranges[n]))
+            bearing = believed[i, 2] + angles[heard]
+            ends = believed[i, :2] + ranges[n, heard, None] * np.column_stack([np.cos(bearing), np.sin(bearing)])
+            cells = np.floor(self._grid(i).to_cells(ends)).astype(int)
+            on = ((cells >= 0) & (cells < strange.shape)).all(axis=1)
+            hit = heard[on][strange[cells[on, 0], cells[on, 1]]]
+            out[n, hit] = np.inf
+        return out
 
     def map_of(self, i: int) -> Evidence:
         """Return the evidence that robot `i` has."""

@@ -97,9 +97,7 @@ class Running:
             pose = np.column_stack([self.position[:, :2], self.heading])
             random = np.random.default_rng([self.seed, 0x5E])
             self.senses = Senses(self.sensing, self.known, self.mission.site, vehicles, pose, random)
-        self.router: Rerouting | None = None
-        if self.senses is not None and len(self.senses.lidars):
-            self.router = Rerouting(self.known, vehicles, self.senses.lidars)
+        self.router = self.senses.router if self.senses is not None else None
         blocking = [o for o in self.mission.site.obstacles if o.blocks & {v.domain for v in vehicles}]
         self.ground, self.pitch, self.roll, self.lift = (np.zeros(self.count) for _ in range(4))
         self.trouble: list[str] = []  # with the terrain

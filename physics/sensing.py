@@ -16,6 +16,7 @@ from quarterdeck.physics.navigation import BY_GNSS, DEAD, LIDAR, REACH, Map, Nav
 from quarterdeck.physics.paths import SAIL
 from quarterdeck.physics.positioning import GNSS
 from quarterdeck.physics.potential_field import PAPER, SCALED, field_velocity, hull_reach, safe_speed, watch_progress
+from quarterdeck.physics.rerouting import Rerouting
 
 BEAMS = 180
 NOISE, DROPOUT = 0.03, 0.01  # m of deviation; part of the beams without echo
@@ -71,6 +72,7 @@ class Senses:
         self.best, self.since, self.leg = np.full(count, np.inf), np.zeros(count), np.full(count, -1)
         self.lidars = np.flatnonzero(ground) if sensing.lidar or sensing.amcl else np.empty(0, int)
         self.angles = beam_angles(BEAMS)
+        self.router = Rerouting(site, vehicles, self.lidars) if len(self.lidars) else None
         self.errors: list[np.ndarray] = []
         self.modes: list[np.ndarray] = []
         known = None
@@ -116,7 +118,10 @@ class Senses:
             discs = np.column_stack([pose[ground, :2], radius[ground]])
             clean = cast(self.grid, pose[self.lidars], self.angles, REACH, discs)
             ranges = self.ranges = noisy(clean, self.random, deviation=NOISE, dropout=DROPOUT, reach=REACH)
-        self.navigation.step(time, step, pose, deaf, self.angles, ranges)
+        told = ranges
+        if ranges is not None and self.router is not None:
+            told = self.router.mapped(self.navigation.believed, self.angles, ranges)
+        self.navigation.step(time, step, pose, deaf, self.angles, told)
         if ranges is not None:
             self._steer(step, pose, present, ranges, legs)
 

@@ -12,6 +12,7 @@ from shapely import MultiPolygon, box
 
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.models import load_model
+from quarterdeck.geo.reader import read_obstacles, read_scenario
 from quarterdeck.geo.scenario import Obstacle, Precedence, Scenario, Site, Task, Vehicle
 from quarterdeck.mission.assign import assign
 from quarterdeck.mission.recovery import recovering
@@ -156,3 +157,15 @@ def test_two_that_meet_in_a_door_make_room():
     assert not run.report.figures["collisions"]
     assert all(v.finished for v in run.report.vehicles)
     assert run.trace.time[-1] < 200
+
+
+def test_what_the_map_does_not_have_does_not_lead_the_filter_astray():
+    """A fence around a task in a hall of few features: the robot knows its place, and says that there is no way in."""
+    root = Path(__file__).parents[2]
+    hall = read_scenario(root / "data" / "inspection_hall.geojson")
+    surprises = read_obstacles(str(root / "examples" / "hall_surprises.geojson"), hall.frame)
+    run = simulate(assign(hall, iterations=10), sensing=Sensing(amcl=True, unmapped=surprises))
+    assert max(v.localisation.p95 for v in run.report.vehicles) < 0.1
+    assert [t.id for t in run.report.tasks if t.driven is None] == ["t1"]
+    assert "found no way" in run.report.tasks[1].reason
+    assert not run.report.figures["collisions"]
