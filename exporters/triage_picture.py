@@ -76,7 +76,7 @@ def telling_moments(outcome: Outcome) -> list[tuple[float, str]]:
         ("state", "centre reached, urgent ones left"): "{who} looks around a red and has found another",
         ("state", "nobody there"): "{who} waits at the rendezvous",
         ("state", "patience over"): "{who} has waited in vain and looks for the medic",
-        ("state", "section overdue"): "{who} takes over the section of {about}",
+        ("takes over", ""): "{who} takes over the section of {about}",
         ("treatment", ""): "{who} treats the first",
         ("undeliverable", ""): "{who} gives up telling a medic",
     }

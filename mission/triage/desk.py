@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from math import hypot
+from math import hypot, inf
 from typing import Any
 
 from shapely import Point
@@ -16,6 +16,7 @@ from quarterdeck.mission.triage.records import XY, Entry, Medic, Memory, Record,
 from quarterdeck.mission.triage.settings import Policy, Settings
 from quarterdeck.mission.triage.team import Team
 
+_EDGE = 2e-6  # m: what the world calls a meeting is in range here, whatever the rounding
 _KIND: dict[type, str] = {Ugv: "ugv", Uav: "uav", Medic: "medic"}
 
 
@@ -87,6 +88,11 @@ class Desk:
         """Return the metres between two members, on the plan."""
         one, other = self.states[a], self.states[b]
         return hypot(one.x - other.x, one.y - other.y)
+
+    @property
+    def reach(self) -> float:
+        """How far two members hear each other, in metres."""
+        return inf if self.policy.everywhere else self.settings.talk + _EDGE
 
     def send(self, name: str, waypoints: Iterable[Waypoint]) -> None:
         """Command a member to do these waypoints from now on; none: stay."""

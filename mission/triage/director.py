@@ -12,12 +12,11 @@ from typing import Any
 
 from quarterdeck.mission.director import Command, Director, Event, State
 from quarterdeck.mission.triage import medic, uav, ugv
+from quarterdeck.mission.triage.board import compare_boards, first_board
 from quarterdeck.mission.triage.desk import Desk
 from quarterdeck.mission.triage.records import Belief, Medic, Memory, Report, Uav, Ugv
 from quarterdeck.mission.triage.settings import Policy, Settings
 from quarterdeck.mission.triage.team import Team
-
-_EDGE = 2e-6  # m: what the world calls a meeting is in range here, whatever the rounding
 
 
 def triage(team: Team, policy: Policy, settings: Settings) -> Director:
@@ -58,22 +57,29 @@ def _begin(desk: Desk) -> None:
     team, settings = desk.team, desk.settings
     treat = settings.treat["red"]
     beliefs = {m: Belief(0.0, *xy, settings.medic_speed, treat) for m, xy in team.medics.items()}
+    board = first_board(team)
     for name in team.ugvs:
-        desk.agents[name] = Ugv(beliefs=beliefs)
+        desk.agents[name] = Ugv(name, board, beliefs=beliefs)
         ugv.resume(desk, name)
     for name in team.uavs:
-        desk.agents[name] = Uav(beliefs=beliefs, visits={u: (0.0, 0, r.start) for u, r in team.ugvs.items()}, misses={})
+        visits = {u: (0.0, 0, r.start) for u, r in team.ugvs.items()}
+        desk.agents[name] = Uav(board, beliefs=beliefs, visits=visits, misses={})
         uav.go_home(desk, name)
     for name, xy in team.medics.items():
-        desk.agents[name] = Medic(last=xy)
+        desk.agents[name] = Medic(board, last=xy)
+        medic.stay(desk, name)
 
 
 def _notice(desk: Desk, event: Event) -> None:
     """Turn what a world reports into what its observer knows."""
     if event.kind == "lost":
         desk.lose(event.vehicle, event.data.get("kind", "stop"))
+        if event.vehicle in desk.mute - desk.out and event.vehicle in desk.team.medics:
+            medic.device_failed(desk, event.vehicle)
     elif event.kind == "returned":
         desk.heard(event.vehicle)
+        if event.vehicle in desk.team.medics:
+            medic.device_works(desk, event.vehicle)
     elif event.vehicle in desk.out:
         return
     elif event.kind == "seen" and event.subject not in desk.tags:
@@ -89,11 +95,23 @@ def _notice(desk: Desk, event: Event) -> None:
         medic.treated(desk, event.vehicle, event.subject)
 
 
+def _compare(desk: Desk, a: str, b: str) -> None:
+    """Let two in range compare boards; a UGV that is done may learn that it is needed, or that nobody is missing."""
+    called = any(desk.agents[name].state == "call" for name in (a, b))
+    before = {name: desk.agents[name].board for name in (a, b)}
+    compare_boards(desk, a, b)
+    for name, board in before.items():
+        it = desk.agents[name]
+        if isinstance(it, Ugv) and it.state == "done" and (called or it.board is not board):
+            ugv.stand_by(desk, name)
+
+
 def _talk(desk: Desk, met: set[tuple[str, str]]) -> None:
     """Let all who are in range, or have been since the last call, exchange what they have to, until nobody has news."""
-    reach = float("inf") if desk.policy.everywhere else desk.settings.talk + _EDGE
     able = [n for n in desk.agents if n not in desk.out | desk.mute]
-    pairs = [p for p in combinations(able, 2) if p in met or desk.distance(*p) <= reach]
+    pairs = [p for p in combinations(able, 2) if p in met or desk.distance(*p) <= desk.reach]
+    for a, b in pairs:
+        _compare(desk, a, b)
     pending = bool(pairs)
     while pending:
         pending = False

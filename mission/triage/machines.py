@@ -47,6 +47,7 @@ UGV = (
     Row("seek", "not found", "search the field", "seek", extra=True),
     Row("seek", "nobody to report to", "tell undeliverable", "return", extra=True),
     Row("seek", "all over, nobody to report to", "tell undeliverable, stop", "done", extra=True),
+    Row("done", "section overdue", "take it over", "return", extra=True),
     Row("return", "casualty seen", "note it", "return"),
     Row("return", "urgent casualty seen", "note it, drive to it", "continued explore"),
     Row("return", "back where it left", "resume the path", "explore"),
@@ -76,6 +77,15 @@ MEDIC = (
     Row("treat", "casualty learnt", "plan the path", "treat"),
     Row("treat", "treated", "strike it off", "plan"),
     Row("plan", "nothing left", "stay", "idle"),
+    Row("plan", "nothing left, device dead", "walk to the rendezvous", "fetch", extra=True),
+    Row("idle", "device dead", "walk to the rendezvous", "fetch", extra=True),
+    Row("fetch", "casualty learnt", "plan the path", "plan", extra=True),
+    Row("fetch", "arrived", "take the spare device", "idle", extra=True),
+    Row("fetch", "heard again", "stay", "idle", extra=True),
+    Row("idle", "section overdue", "walk to a UGV that is done", "call", extra=True),
+    Row("call", "casualty learnt", "plan the path", "plan", extra=True),
+    Row("call", "device dead", "walk to the rendezvous", "fetch", extra=True),
+    Row("call", "arrived", "stay", "idle", extra=True),
 )
 
 MACHINES: Mapping[str, tuple[Row, ...]] = MappingProxyType({"ugv": UGV, "uav": UAV, "medic": MEDIC})

@@ -1,11 +1,14 @@
 """The medic: idle, plan, go, treat (Fig. 5). His queue is planned anew at every new casualty, in the method's order."""
 
+from math import hypot, inf
+
 import numpy as np
 from shapely import box
 
 from quarterdeck.geo.scenario import as_multipolygon
 from quarterdeck.mission.mission import Waypoint
 from quarterdeck.mission.priority_tsp import priority_order
+from quarterdeck.mission.triage.board import due, overdue
 from quarterdeck.mission.triage.chase import LEGS, expanding_square
 from quarterdeck.mission.triage.desk import Desk
 from quarterdeck.mission.triage.records import Belief, Medic, Report
@@ -54,6 +57,12 @@ def treated(desk: Desk, name: str, casualty: str) -> None:
 def arrived(desk: Desk, name: str) -> None:
     """He stands where he was told: treats, unless somebody else has, which he sees; if nobody is there, he looks around."""
     me: Medic = desk.agents[name]
+    if me.state == "fetch":
+        desk.heard(name)
+    if me.state in ("fetch", "call"):
+        desk.fire(name, "arrived")
+    if me.state in ("fetch", "call", "idle"):
+        stay(desk, name)
     if me.state != "go":
         return
     report = me.queue[0]
@@ -78,6 +87,48 @@ def arrived(desk: Desk, name: str) -> None:
     desk.change(name, treat_until=desk.time + seconds, heading_for="")
     x, y = desk.here(name)
     desk.send(name, [Waypoint(x, y, hold=seconds, task=report.id)])
+
+
+def stay(desk: Desk, name: str) -> None:
+    """Nothing to treat: he stays. Where UGVs report to him, he has one that is done take over a section that is overdue."""
+    me: Medic = desk.agents[name]
+    if desk.policy.receiver != "medic" or desk.policy.everywhere or name in desk.mute:
+        desk.send(name, ())
+        return
+    busy = {e.by for e in me.board.values() if e.rest >= 0}
+    free = {e.by: e.place for e in me.board.values() if e.rest < 0 and e.by not in busy | me.called}
+    if free and overdue(desk, me.board):
+        here = desk.here(name)
+        ugv = min(free, key=lambda u: (hypot(free[u][0] - here[0], free[u][1] - here[1]), u))
+        desk.change(name, called=me.called | {ugv}, heading_for="")
+        desk.fire(name, "section overdue")
+        desk.drive(name, desk.team.on_foot(here, desk.stand(name, free[ugv])), _speed(desk, me))
+        return
+    later = [t for s in me.board if desk.time + 1e-6 < (t := due(desk, s, me.board)) < inf]
+    if later:
+        desk.drive(name, [desk.here(name)], _speed(desk, me), hold=min(later) - desk.time)
+    else:
+        desk.send(name, ())
+
+
+def device_failed(desk: Desk, name: str) -> None:
+    """He can hear nobody any more: when he has treated all whom he knows of, he goes for the spare device."""
+    if desk.fire(name, "device dead"):
+        _fetch(desk, name)
+
+
+def device_works(desk: Desk, name: str) -> None:
+    """He hears again, and has no need of the spare device."""
+    if desk.fire(name, "heard again"):
+        stay(desk, name)
+
+
+def _fetch(desk: Desk, name: str) -> None:
+    """Walk to the nearest depot: the rendezvous or, without one, where a medic started. There the spare devices are."""
+    here = desk.here(name)
+    place = min(desk.team.depots, key=lambda d: (hypot(d[0] - here[0], d[1] - here[1]), d))
+    desk.change(name, heading_for="")
+    desk.drive(name, desk.team.on_foot(here, desk.stand(name, place)), _speed(desk, desk.agents[name]))
 
 
 def _look_around(desk: Desk, name: str, report: Report, sigmas: float) -> None:
@@ -137,8 +188,11 @@ def _plan(desk: Desk, name: str) -> None:
     if treating:
         return
     if not queue:
-        if desk.fire(name, "nothing left"):
-            desk.send(name, ())
+        if name in desk.mute:
+            desk.fire(name, "nothing left, device dead")
+            _fetch(desk, name)
+        elif desk.fire(name, "nothing left"):
+            stay(desk, name)
         return
     desk.fire(name, "path planned")
     if queue[0].id == me.heading_for:

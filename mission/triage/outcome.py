@@ -165,9 +165,9 @@ def _fates(scenario: Scenario, log: Sequence[Entry], data: Mapping[str, Mapping[
 def _reasons(team: Team, fates: Sequence[Fate], memory: Memory, run: Run) -> tuple[str, ...]:
     reasons = [run.reason] if run.reason else []
     reasons += [
-        f"{name} stopped before its section was searched"
+        f"{name} stopped before its section was searched, and nobody took it over"
         for name in team.ugvs
-        if name in memory.out and not getattr(memory.agents[name], "searched", True)
+        if name in memory.out and name not in {e.about for e in memory.log if e.what == "searched"}
     ]
     if team.search.missed > 0:
         reasons.append(f"{team.search.missed:,.0f} m2 of the field cannot be seen from where the UGVs can go")
@@ -175,7 +175,9 @@ def _reasons(team: Team, fates: Sequence[Fate], memory: Memory, run: Run) -> tup
         if fate.state == "not found":
             reasons.append(f"casualty {fate.id} ({fate.colour}) was not found")
         elif fate.state == "found":
-            reasons.append(f"casualty {fate.id} ({fate.colour}) was found by {fate.found_by}, who told nobody")
+            told = f"{fate.reported_by}, which told no medic" if fate.reported else f"{fate.found_by}, who told nobody"
+            verb = "reported to" if fate.reported else "found by"
+            reasons.append(f"casualty {fate.id} ({fate.colour}) was {verb} {told}")
         elif fate.state == "undeliverable":
             reasons.append(f"casualty {fate.id} ({fate.colour}) could not be told to any medic")
         elif fate.state == "delivered":

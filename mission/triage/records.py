@@ -35,11 +35,28 @@ class Belief:
 
 
 @dataclass(frozen=True, slots=True)
+class Section:
+    """What is known of a UGV's section: at `time` it was searched up to waypoint `rest` of its path (-1: all of it).
+
+    `by` searches it, and was, or left it, at `place`.
+    """
+
+    time: float
+    rest: int
+    place: XY
+    by: str
+
+
+@dataclass(frozen=True, slots=True)
 class Ugv:
     """`reports` no medic is known to have yet; `told`: those of them told undeliverable; `around`: urgent, not visited yet.
 
-    `rest` is the first waypoint of its search path not reached when it left the path at `left`; `gathered` counts N.
+    It searches the path of `section`; `rest` is the first waypoint not reached when it left the path at `left`; `gathered`
+    counts N. `board`, here as with all others: what is known of the sections, by name.
     """
+
+    section: str
+    board: Mapping[str, Section]
 
     state: str = "explore"
     moving: bool = False
@@ -61,8 +78,10 @@ class Ugv:
 class Uav:
     """`load`: (report, medic it is meant for). `closed`: ids that a medic has. `home` is the index of its rendezvous.
 
-    `target` is the medic or, in a round robin, the UGV it flies to; `seen_ugvs` where each UGV was on its path, and when.
+    `target` is the medic or, in a round robin, the UGV it flies to; `visits` where each UGV was on its path, and when.
     """
+
+    board: Mapping[str, Section]
 
     state: str = "return"
     moving: bool = False
@@ -82,8 +101,10 @@ class Medic:
     """`queue` in the order of treatment, the first being walked to or treated, in treatment until `treat_until`.
 
     `examined` is the category of whom he has seen, `walked` metres since the start, `last` where he last set out,
-    `looked` how often he has searched around where the first of his queue should be.
+    `looked` how often he has searched around where the first of his queue should be, `called` the UGVs he has walked to.
     """
+
+    board: Mapping[str, Section]
 
     state: str = "idle"
     moving: bool = False
@@ -97,6 +118,7 @@ class Medic:
     looked: int = 0
     last: XY = (0.0, 0.0)
     examined: Mapping[str, str] | None = None
+    called: frozenset[str] = frozenset()
 
 
 Record = Ugv | Uav | Medic
@@ -104,7 +126,9 @@ Record = Ugv | Uav | Medic
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A line of the log. `what`: found, handed, delivered, treatment, treated, undeliverable, lost, heard again, state."""
+    """A line of the log. `what`: found, handed, delivered, treatment, treated, undeliverable, lost, heard again, searched,
+    takes over, state.
+    """
 
     time: float
     who: str

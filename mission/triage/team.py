@@ -51,13 +51,16 @@ class Team:
     """Who works on a site, and how they get about. `medics` are starts by id; `ground`, `foot`
     and `air` are where UGVs, medics and UAVs may be.
 
-    `distances` gives the medics' (n, n) metres between (n, 2) points; `on_ground`, `on_foot` and `in_air` shortest paths.
+    `depots` are where spare devices for medics are, and where who has nobody to report to comes: the rendezvous or, without
+    any, where medics start. `distances` gives the medics' (n, n) metres between (n, 2) points; `on_ground`, `on_foot` and
+    `in_air` shortest paths.
     """
 
     ugvs: Mapping[str, Robot]
     uavs: Mapping[str, Robot]
     medics: Mapping[str, XY]
     search: Search
+    depots: tuple[XY, ...]
     ground: MultiPolygon
     foot: MultiPolygon
     air: MultiPolygon
@@ -132,6 +135,7 @@ def make_team(
         },
         medics=dict(scenario.medics),
         search=search,
+        depots=tuple(points) or tuple(xy for _, xy in scenario.medics),
         ground=ground,
         foot=foot,
         air=air,

@@ -47,20 +47,24 @@ def arrived(desk: Desk, name: str) -> None:
 
 
 def meets_medic(desk: Desk, name: str, other: str) -> bool:
-    """Hand a medic what is meant for him; he shows his queue. Return whether anything was said."""
+    """Hand a medic what is meant for him, or could not be told before; he shows his queue.
+
+    Return whether anything was said.
+    """
     me: Uav = desk.agents[name]
-    if me.state != "deliver":
+    if me.state != "deliver" and not me.load:
         return False
-    mine = tuple(r for r, to in me.load if to == other)
+    mine = tuple(r for r, to in me.load if to == other or r.id in me.told)
     if not mine and me.target != other:
         return False
     for r in mine:
         desk.note(name, "delivered", r.id, whom=other)
     medic.learn(desk, other, mine)
     closed = me.closed | desk.agents[other].known
-    left = tuple((r, to) for r, to in me.load if to != other and r.id not in closed)
+    left = tuple((r, to) for r, to in me.load if r.id not in closed)
     beliefs = {**(me.beliefs or {}), other: medic.belief(desk, other)}
-    desk.change(name, load=left, closed=closed, beliefs=beliefs, target="")
+    told, unreachable = me.told - closed, me.unreachable - {other}
+    desk.change(name, load=left, closed=closed, told=told, unreachable=unreachable, beliefs=beliefs, target="")
     if left and desk.fire(name, "delivered, another medic's left"):
         _fly_to_medic(desk, name)
     elif desk.fire(name, "all delivered"):
@@ -149,11 +153,12 @@ def _fly_to_medic(desk: Desk, name: str) -> None:
 
 
 def _give_up(desk: Desk, name: str) -> None:
-    """Say so: no medic can be told."""
+    """Say so: no medic can be told; the list is kept, for one may yet come by."""
     me: Uav = desk.agents[name]
     for r, _ in me.load:
-        desk.note(name, "undeliverable", r.id)
-    desk.change(name, told=me.told | {r.id for r, _ in me.load}, load=(), target="")
+        if r.id not in me.told:
+            desk.note(name, "undeliverable", r.id)
+    desk.change(name, told=me.told | {r.id for r, _ in me.load}, target="")
     desk.fire(name, "nobody to report to")
     go_home(desk, name)
 

@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
-from math import hypot
+from math import hypot, inf
 
 from quarterdeck.mission.triage import medic, uav
+from quarterdeck.mission.triage.board import compare_in_range, due, overdue, write_own
 from quarterdeck.mission.triage.chase import chase, meeting_time, predict
 from quarterdeck.mission.triage.desk import Desk
-from quarterdeck.mission.triage.records import XY, Report, Uav, Ugv
+from quarterdeck.mission.triage.records import XY, Report, Section, Uav, Ugv
 
 _REPORTING = ("deliver", "wait", "seek")
 _OUTSIDE = 3.0  # times as far from the rendezvous as its place there
@@ -46,7 +47,8 @@ def arrived(desk: Desk, name: str) -> None:
     """It has come to the end of what it was told to drive."""
     me: Ugv = desk.agents[name]
     if me.state == "explore":
-        desk.change(name, searched=True, left=desk.here(name), rest=len(desk.team.ugvs[name].path))
+        desk.change(name, searched=True, left=desk.here(name), rest=len(desk.team.ugvs[me.section].path))
+        desk.note(name, "searched", me.section)
         if desk.fire(name, "section searched"):
             _report(desk, name)
     elif me.state == "return":
@@ -63,6 +65,8 @@ def arrived(desk: Desk, name: str) -> None:
     elif me.state == "deliver":
         if desk.fire(name, "nobody there"):
             _wait(desk, name)
+    elif me.state == "done":
+        stand_by(desk, name)
     elif me.state == "wait":
         desk.change(name, relay_lost=desk.policy.receiver == "uav", sweeps=0)
         if desk.fire(name, "patience over"):
@@ -112,16 +116,20 @@ def meets_uav(desk: Desk, name: str, other: str) -> bool:
 
 
 def meets_medic(desk: Desk, name: str, other: str) -> bool:
-    """Report to a medic himself: without a relay, or when the relay is lost. Return whether anything was said."""
+    """Report to a medic himself: without a relay, or when it is lost, or who could not be told before.
+
+    Return whether anything was said.
+    """
     me: Ugv = desk.agents[name]
     direct = desk.policy.receiver == "medic" and (me.state in _REPORTING or desk.policy.everywhere)
-    if not direct and not (me.relay_lost and me.state in _REPORTING):
+    if not direct and not (me.relay_lost and me.state in _REPORTING) and not (me.told and me.reports):
         return False
     for r in me.reports:
         desk.note(name, "delivered", r.id, whom=other)
     medic.learn(desk, other, me.reports)
     beliefs = {**(me.beliefs or {}), other: medic.belief(desk, other)}
-    desk.change(name, reports=(), told=frozenset(), known=me.known | desk.agents[other].known, beliefs=beliefs)
+    known, unreachable = me.known | desk.agents[other].known, me.unreachable - {other}
+    desk.change(name, reports=(), told=frozenset(), known=known, unreachable=unreachable, beliefs=beliefs)
     return _after_handing(desk, name, said=bool(me.reports)) or bool(me.reports)
 
 
@@ -135,11 +143,54 @@ def aim_again(desk: Desk) -> None:
 def resume(desk: Desk, name: str) -> None:
     """Search on along the path from the first waypoint not reached."""
     me: Ugv = desk.agents[name]
-    path = desk.team.ugvs[name].path[me.rest :]
+    path = desk.team.ugvs[me.section].path[me.rest :]
     if path:
         desk.send(name, path)
     else:
         _drive(desk, name, [desk.here(name)])
+
+
+def stand_by(desk: Desk, name: str) -> None:
+    """Done with its section, it takes over one that is overdue; else it waits where others come, until one could be."""
+    write_own(desk, name)
+    if desk.settings.rendezvous == "round-robin" or name in desk.mute:
+        desk.send(name, ())
+        return
+    compare_in_range(desk, name)
+    me: Ugv = desk.agents[name]
+    if late := overdue(desk, me.board):
+        _take_over(desk, name, late[0])
+        return
+    here, speed = desk.here(name), desk.team.ugvs[name].speed
+    soon = min(due(desk, s, me.board) for s in me.board)
+    meeting = desk.policy.receiver == "uav" or desk.policy.everywhere  # elsewhere it will hear of nobody: a medic calls it
+    near = min(_length([here, d]) for d in desk.team.depots) <= desk.reach
+    hold = soon - desk.time if meeting and soon < inf else 0.0
+    if (near and hold <= 0) or not ((meeting and soon < inf) or me.reports):
+        desk.send(name, ())
+    else:
+        corners = [here] if near else _to_depot(desk, name)
+        desk.drive(name, corners, speed, hold=max(hold, 0.0))
+
+
+def _take_over(desk: Desk, name: str, section: str) -> None:
+    """Search what is left of a section whose UGV is lost, from where the last word has it."""
+    me: Ugv = desk.agents[name]
+    entry = me.board[section]
+    desk.note(name, "takes over", section)
+    board = {**me.board, section: Section(desk.time, entry.rest, entry.place, name)}
+    desk.change(name, section=section, rest=entry.rest, left=entry.place, searched=False, sweeps=0, board=board)
+    desk.fire(name, "section overdue")
+    _back(desk, name)
+
+
+def _to_depot(desk: Desk, name: str) -> list[XY]:
+    """Return the way to its place at the nearest depot."""
+    here, ways = desk.here(name), desk.team.on_ground
+    corners: list[XY] = []
+    for place in _berth(desk, name, min(desk.team.depots, key=lambda d: _length([here, d]))):
+        corners += ways(corners[-1] if corners else here, place)
+    return corners
 
 
 def _after_handing(desk: Desk, name: str, *, said: bool) -> bool:
@@ -153,7 +204,7 @@ def _after_handing(desk: Desk, name: str, *, said: bool) -> bool:
         return True
     if all(r.id in me.told for r in me.reports):
         desk.fire(name, "receipt in hand")
-        desk.send(name, ())
+        stand_by(desk, name)
         return True
     if me.state != "wait" or said:
         desk.fire(name, "handed over, receipt due")
@@ -175,7 +226,7 @@ def _report(desk: Desk, name: str) -> None:
         must_look = me.relay_lost or not desk.settings.knows_medic
         if me.searched and must_look and not me.reports and not desk.policy.everywhere:
             desk.fire(name, "receipt in hand")  # an empty list is not worth a search for a medic
-            desk.send(name, ())
+            stand_by(desk, name)
         elif me.unreachable >= set(desk.team.medics):
             _give_up(desk, name)
         else:
@@ -243,7 +294,7 @@ def _give_up(desk: Desk, name: str) -> None:
     desk.change(name, told=me.told | {r.id for r in me.reports})
     if me.searched:
         desk.fire(name, "all over, nobody to report to")
-        desk.send(name, ())
+        stand_by(desk, name)
     else:
         desk.fire(name, "nobody to report to")
         _back(desk, name)

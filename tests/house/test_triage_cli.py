@@ -7,6 +7,7 @@ import pytest
 
 from quarterdeck.cli import main
 from quarterdeck.geo.reader import read_scenario
+from quarterdeck.mission.planfile import read_plan
 
 
 def run(capsys: pytest.CaptureFixture[str], *args: str) -> tuple[int, str, str]:
@@ -47,11 +48,23 @@ def test_figures_as_json_for_all_methods(site: str, capsys: pytest.CaptureFixtur
 
 
 def test_what_cannot_be_done_is_told_with_status_1(site: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """The only medic's device fails at once: what is told is what stays untreated."""
-    status, out, err = run(capsys, site, "--fail", "medic1@0")
+    """All UGVs are lost early: who was not found, or not told of, is told, each in its line."""
+    status, _, err = run(capsys, site, *(a for i in (1, 2, 3) for a in ("--fail", f"ugv{i}@30")))
     assert status == 1
-    states = [f["properties"]["state"] for f in json.loads(out)["features"][1:]]
-    assert err.count("could not be told to any medic") == states.count("undeliverable") > 0
+    untreated = [c.id for c in read_scenario(site).casualties if f"casualty {c.id} (" in err]
+    assert untreated
+    assert err.count("before its section was searched") == 3
+
+
+def test_the_plan_is_one_that_simulate_takes(site: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """--plan writes a PLAN with a route a member of the team; --snapshots a picture."""
+    plan, picture = tmp_path / "plan.geojson", tmp_path / "s.png"
+    assert run(capsys, site, "--plan", str(plan), "--snapshots", str(picture))[0] == 0
+    mission = read_plan(plan)
+    assert mission.method == "triage"
+    assert [r.vehicle for r in mission.routes] == ["medic1", "ugv1", "ugv2", "ugv3", "uav1"]
+    assert mission.feasible
+    assert picture.read_bytes()[:4] == b"\x89PNG"
 
 
 def test_generated_cases_are_readable_seeded_sites(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
