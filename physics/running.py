@@ -12,7 +12,6 @@ from quarterdeck.geo.scenario import Site
 from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.director import Command, Director, Event, State, wake_time
 from quarterdeck.mission.mission import Mission, Waypoint
-from quarterdeck.mission.triage.plan import METHOD as TRIAGE
 from quarterdeck.physics.faults import Fault, active, next_change
 from quarterdeck.physics.fleet import Rovers, Squad, form_squads
 from quarterdeck.physics.navigation import REACH
@@ -34,6 +33,7 @@ KEEP = 3.0  # lengths kept from other vehicles
 CRASH = 4.0  # m/s: a multirotor that meets the ground faster is out of the mission
 ASIDE = 50.0  # m about the ground routes in which PyBullet has the terrain
 UP = np.array([0.0, 0.0, 1.0])
+WAITS, CREEP = 8.0, 0.15  # s that a vehicle stands for others; of its pace that it then goes
 STUCK = 60.0  # s in contact without a pause: the vehicle is given up
 
 
@@ -69,8 +69,6 @@ class Running:
         self.length = np.array([v.model.length for v in vehicles])
         self.keep = KEEP * self.length
         self.wary = False  # somebody is so near to another that a second is long
-        if self.mission.method == TRIAGE:  # small robots that meet on purpose
-            self.keep *= 2.0 / KEEP
         self.brakes = np.array([v.model.acceleration for v in vehicles])
         self.random = np.random.default_rng(self.seed)
         self.gust = np.zeros((self.count, MEMORY))
@@ -81,7 +79,7 @@ class Running:
         self.commands: dict[str, tuple[Waypoint, ...]] = {}
         self.told = np.zeros(self.count, int)
         self.done = False
-        self.slow = np.full(self.count, np.inf)
+        self.slow, self.stood = np.full(self.count, np.inf), np.zeros(self.count)
         rooms = {d: _prepared(self.mission.site.navigable(d)) for d in sorted({v.domain for v in vehicles})}
         self.room = [rooms[v.domain] for v in vehicles]
         self.ids = [v.id for v in vehicles]
@@ -412,6 +410,11 @@ class Running:
         self.wary = stop_short(
             self.position, self.velocity, course, pace, want - aside, self.length, self.brakes, present, slow
         )
+        # Who has stood for others too long creeps on, the first in the list first: two may stand for each other.
+        free = (slow > 0.05 * pace) | ~np.any(course != 0.0, axis=1) | ~present
+        self.stood = np.where(free, self.time, self.stood)
+        creeps = self.time - self.stood > WAITS + 2.0 * np.arange(self.count)
+        slow[creeps] = np.maximum(slow, CREEP * pace)[creeps]
         self.slow = slow
         for squad in self.squads:
             squad.tracks["slow"], squad.tracks["want"] = slow[squad.index], want[squad.index]

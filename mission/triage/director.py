@@ -80,6 +80,8 @@ def _notice(desk: Desk, event: Event) -> None:
         desk.heard(event.vehicle)
         if event.vehicle in desk.team.medics:
             medic.device_works(desk, event.vehicle)
+        elif event.vehicle in desk.team.ugvs and desk.agents[event.vehicle].state == "done":
+            ugv.stand_by(desk, event.vehicle)
     elif event.vehicle in desk.out:
         return
     elif event.kind == "seen" and event.subject not in desk.tags:
