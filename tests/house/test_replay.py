@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quarterdeck.cli import main
@@ -120,6 +120,7 @@ JSON = st.recursive(
 )
 
 
+@settings(deadline=None)
 @given(a=JSON, b=JSON)
 def test_no_difference_is_overlooked(a: object, b: object) -> None:
     """Documents without differences are equal; a document has none with itself."""
