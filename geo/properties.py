@@ -92,7 +92,11 @@ PROPERTIES: dict[str, dict[str, Property]] = {
             'an object with "kind": swath, camera or sonar',
             "what it surveys with: `swath` in metres; a `camera` by name or figures; a sonar's figures: see sensors.md",
         ),
-        "range": _number("a number above 0", "metres it sees or speaks, for guards and triage", **_POSITIVE),
+        "range": _number(
+            "a number above 0",
+            "metres it sees (guards, triage) or speaks (all else); default no limit to speech",
+            **_POSITIVE,
+        ),
         "can": Property(TEXTS, "a list of texts", "its capabilities, matched with a task's `needs`"),
     },
     "task": {

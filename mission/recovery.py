@@ -18,6 +18,7 @@ from shapely import MultiPolygon, Point
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Obstacle, as_multipolygon
 from quarterdeck.mission.changes import Changes
+from quarterdeck.mission.contact import Contact, within_range
 from quarterdeck.mission.director import Command, Director, Event, State
 from quarterdeck.mission.inspection import Memory as Inspected
 from quarterdeck.mission.inspection import default_director
@@ -63,7 +64,8 @@ def recovering(mission: Mission, *, delay: float = 0.0, tell: Tell | None = None
     Who is heard of again within the delay was a false alarm; who comes back later takes a part of what is left. Where a
     robot finds no way to a task, what it found becomes an obstacle of the new plan, and the task goes to who can reach it.
     `tell` gets the time and each new plan. A loss that nobody is left to recover from changes nothing until somebody comes
-    back. A triage team sees to its losses itself.
+    back. A triage team sees to its losses itself. Vehicles with a `range` are heard within it alone (`mission.contact`),
+    except in guards plans, where it is how far they see.
     """
     if mission.method == METHOD:
         return default_director(mission)
@@ -97,7 +99,8 @@ def recovering(mission: Mission, *, delay: float = 0.0, tell: Tell | None = None
         commands, inner = now.director(time - now.since, states, events, now.inner)
         return commands, replace(now, inner=inner)
 
-    return direct
+    ranged = mission.method != "guards" and any(v.range is not None for v in mission.vehicles)
+    return within_range(direct, mission) if ranged else direct
 
 
 def _replanned(
@@ -158,6 +161,8 @@ def _replanned(
 
 def undone(memory: Any) -> tuple[str, ...]:
     """Return, one line each, what a director's `memory` says will not be done, and why."""
+    if isinstance(memory, Contact):
+        return undone(memory.inner)
     if isinstance(memory, _Memory):
         return tuple(dict.fromkeys((*memory.undone, *undone(memory.inner))))
     if isinstance(memory, Inspected):

@@ -135,6 +135,8 @@ def stop_short(
             if abs(pz) > touch + abs(velocity[j, 2] - velocity[i, 2]) * ahead or px * ux + py * uy <= 0.0:
                 continue
             near |= np.hypot(px, py) < touch + ahead * (np.hypot(ux, uy) + np.hypot(velocity[j, 0], velocity[j, 1]))
+            if np.hypot(px, py) < 0.5 * touch:  # one upon the other, where they are launched: the list decides
+                continue
             vx, vy = velocity[j, 0], velocity[j, 1]
             if not moving and i > j:
                 vx, vy, _ = _motion(velocity[j], course[j], pace[j], shift[j], length[j])

@@ -69,8 +69,8 @@ def simulate(
     instead of known (default: all is known). `terrain` is the ground (default: flat). `limits` change the verdict's
     (see report.LIMITS). The run ends when every vehicle is done, or after `duration` seconds (default: twice the planned
     time and ten minutes; of all vehicles' times together where a director may replan). `progress` is told seconds done and
-    expected. Plans of tasks, and those under a director, are run in the fast world too, under `expected` (default: the same
-    director), and stand beside the run in the report.
+    expected. Under `expected`, such as `director` without its side effects (default, where no director is given: the schedule
+    of a plan of tasks), the mission is run in the fast world too, and stands beside the run in the report.
 
     Raises InputError for a vehicle model without its dynamics or a wrong option, UnavailableError where PyBullet is
     absent.
@@ -89,7 +89,9 @@ def simulate(
         # Its routes are those without a find; what casualties add to them shows only in the run.
         until = max(until, TRIAGE) if duration is None else until
         limits = {"delay": LATE} | dict(limits or {})
-    plan, beside = mission, director is not None or mission.method == "assign"
+    if expected is None and director is None and mission.method == "assign":
+        expected = default_director(mission)
+    plan = mission
     known, director = mission.site, director or default_director(mission)
     there = known.obstacles if sensing.world is None else sensing.world
     mission = replace(mission, site=replace(known, obstacles=(*there, *sensing.unmapped)))
@@ -151,7 +153,7 @@ def simulate(
         triage=compared.document() if compared else None,
         servers=run.servers,
         undone=undone(run.memory),
-        fast=_fast(plan, expected or director, befalling, until) if beside and not triage else None,
+        fast=_fast(plan, expected, befalling, until) if expected and not triage else None,
     )
     made = None
     if sensing.mapping and run.router is not None:

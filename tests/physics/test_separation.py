@@ -1,8 +1,13 @@
 """Encounters: nobody touches anybody, and everybody arrives."""
 
 import pytest
+from shapely import MultiPolygon, box
 
+from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.models import load_model
+from quarterdeck.geo.scenario import Area, Scenario, Site, Task, Vehicle
+from quarterdeck.mission.assign import assign
+from quarterdeck.mission.recovery import recovering
 from quarterdeck.physics.simulate import simulate
 
 pytest.importorskip("pybullet", reason="PyBullet has wheels for Linux and CPython 3.11 only")
@@ -52,3 +57,27 @@ def test_crossing_the_one_with_the_other_to_starboard_lets_it_pass(sail):
     north, west = (trace.y[:, 0] > 0).argmax(), (trace.x[:, 1] < 0).argmax()
     assert west < north  # the west-going one is first at the crossing
     assert abs(trace.y[:, 1]).max() < 0.5  # and keeps its course
+
+
+def test_separation_holds_while_replanning():
+    """Four vessels whose routes cross replan when two are lost: none of the others comes near another or a wreck."""
+    area = MultiPolygon([box(-150.0, -150.0, 150.0, 150.0)])
+    model = load_model("otter")
+    starts = {"north": (0.0, 140.0), "east": (140.0, 0.0), "south": (0.0, -140.0), "west": (-140.0, 0.0)}
+    vehicles = tuple(
+        Vehicle(name, model, place, speed=model.speed, turn_radius=model.turn_radius, clearance=model.clearance)
+        for name, place in starts.items()
+    )
+
+    places = [(80.0, 80.0), (-80.0, 80.0), (-80.0, -80.0), (80.0, -80.0), (90.0, 10.0), (-90.0, -10.0)]
+    tasks = tuple(Task(f"t{i}", place) for i, place in enumerate(places))
+    site = Site((Area("area", area),), area)
+    mission = assign(Scenario("crossing", Frame(0.0, 60.0), site, vehicles, tasks), iterations=20)
+    told = []
+    director = recovering(mission, delay=5.0, tell=lambda *plan: told.append(plan))
+    run = simulate(mission, director=director, faults=["north@40", "east@60"])
+    assert len(told) == 2
+    assert {o.id for o in told[1][1].site.obstacles} == {"wreck of north", "wreck of east"}
+    assert run.report.figures["collisions"] == 0
+    assert run.report.figures["tasks_served"] == len(tasks)
+    assert run.report.figures["separation"] > 0.1 * model.length
