@@ -69,8 +69,8 @@ def simulate(
     instead of known (default: all is known). `terrain` is the ground (default: flat). `limits` change the verdict's
     (see report.LIMITS). The run ends when every vehicle is done, or after `duration` seconds (default: twice the planned
     time and ten minutes; of all vehicles' times together where a director may replan). `progress` is told seconds done and
-    expected. Under `expected`, such as `director` without its side effects (default, where no director is given: the schedule
-    of a plan of tasks), the mission is run in the fast world too, and stands beside the run in the report.
+    expected. Under `expected`, such as `director` without its side effects (default, where no director is given: the
+    schedule of a plan of tasks), the mission is run in the fast world too, and stands beside the run in the report.
 
     Raises InputError for a vehicle model without its dynamics or a wrong option, UnavailableError where PyBullet is
     absent.

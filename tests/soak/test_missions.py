@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("pybullet", reason="PyBullet is not installed")
 attempt = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "missions.py"))["attempt"]
-CASES = 24  # of the 1,000 that `python benchmarks/missions.py --cases 1000` runs
+CASES = 8  # of the 1,000 that `python benchmarks/missions.py --cases 1000` runs
 
 
 @pytest.mark.parametrize("seed", range(CASES))
