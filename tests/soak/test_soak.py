@@ -52,8 +52,8 @@ def test_damaged_input(worker, sound, soak_cases, soak_from, tmp_path_factory):
         every = [c for c, *_ in cases]
         sys.stderr.write(f"\n{len(cases)} cases {every[:8]}, {name}, in {folder}: {' '.join(request.args)}\n{why}\n")
     assert not broken, f"{sum(map(len, broken.values()))} of {soak_cases} cases, of {len(broken)} kinds: see standard error"
-    if soak_cases >= 1000:  # damage leaves something to do for each: else only refusals are tried
-        for name in names:
+    for name in names:  # damage leaves something to do for each: else only refusals are tried
+        if sum(count for (n, _), count in ended.items() if n == name) >= 50:
             assert ended[name, 0] + ended[name, 1], f"no case of {name} was sound"
 
 
