@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from quarterdeck.cli import main
@@ -120,7 +120,7 @@ JSON = st.recursive(
 )
 
 
-@settings(deadline=None)
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(a=JSON, b=JSON)
 def test_no_difference_is_overlooked(a: object, b: object) -> None:
     """Documents without differences are equal; a document has none with itself."""
