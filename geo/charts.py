@@ -167,6 +167,8 @@ def _frame(cells: Sequence[Cell], bounds: tuple[float, float, float, float] | No
         names = ", ".join(cell.name for cell in cells)
         raise InputError(f"{names}: no depth areas (DEPARE, DRGARE) with a shape, so no water is known; give another cell")
     west, south, east, north = bounds or shapely.total_bounds(shapes)
+    if not (-180 <= west <= east <= 180 and -90 <= south <= north <= 90):
+        raise InputError(f"{', '.join(cell.name for cell in cells)}: reaches beyond the earth's degrees; get the cell anew")
     frame = Frame(float(west + east) / 2, float(south + north) / 2)
     reach = np.hypot(*frame.to_metres(np.array([[west, south], [east, north]])).T).max()
     if reach > SPAN:

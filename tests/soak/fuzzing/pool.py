@@ -62,5 +62,13 @@ class Worker:
 
 def _start() -> subprocess.Popen[bytes]:
     environment = os.environ | {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "COLUMNS": "120"}
-    command = [sys.executable, "-P", "-W", "error", str(Path(__file__).with_name("worker.py"))]
+    command = [
+        sys.executable,
+        "-P",
+        "-W",
+        "error",
+        "-W",
+        "ignore::PendingDeprecationWarning",
+        str(Path(__file__).with_name("worker.py")),
+    ]
     return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
