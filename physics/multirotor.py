@@ -123,12 +123,6 @@ def coast_multirotors(
 
 
 @njit(cache=True)
-def heading_of(s: np.ndarray) -> float:
-    """Return the yaw of the quaternion, radians counter-clockwise from east."""
-    return np.arctan2(2 * (s[6] * s[9] + s[7] * s[8]), 1 - 2 * (s[8] ** 2 + s[9] ** 2))
-
-
-@njit(cache=True)
 def _control(s: np.ndarray, p: Any, target: np.ndarray, dt: float, q: np.ndarray) -> None:
     """Set the rotor commands q[0:4] in newtons for the target position, velocity and heading."""
     kv = p.bandwidth / 3

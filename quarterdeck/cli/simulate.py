@@ -112,7 +112,7 @@ class Limit(click.ParamType):
     help="Write the map that the robots draw by lidar, for map_server, .yaml and .pgm (implies --lidar).",
 )  # fmt: skip
 @click.option(
-    "--terrain", metavar="FILE", help="Ground that is not flat: an ESRI ASCII grid, or NPZ. See docs/simulation.md."
+    "--terrain", metavar="FILE", help="Ground that is not flat: GeoTIFF, ESRI ASCII grid or NPZ. See docs/simulation.md."
 )
 @seed_option
 @click.option(

@@ -11,16 +11,19 @@ from quarterdeck.cli import main
 DATA = Path(__file__).parents[2] / "data"
 
 
-def refused(capsys, *arguments):
-    """Run the command line and return its one line of refusal."""
+def refused(capsys, *arguments, usage=False):
+    """Run the command line and return its one line of refusal; an option's wrong value is told below its usage."""
     with pytest.raises(SystemExit) as stop:
         main([str(a) for a in arguments])
     assert stop.value.code == 2
     captured = capsys.readouterr()
     assert not captured.out
     lines = captured.err.strip().splitlines()
-    assert len(lines) == 1 or lines[0].startswith("Usage:"), lines  # click tells the usage first
-    return lines[-1]
+    if usage:  # click tells it first
+        assert [line.split(" ")[0] for line in lines[:-1]] == ["Usage:", "Try", ""], lines
+        return lines[-1]
+    assert len(lines) == 1, lines
+    return lines[0]
 
 
 def changed(tmp_path, site, change):
@@ -75,9 +78,9 @@ def test_a_name_too_long_for_a_file(tmp_path, capsys):
 
 @pytest.mark.parametrize("angle", ["nan", "inf"])
 def test_an_angle_that_is_no_number(tmp_path, capsys, angle):
-    """Such an angle is one line."""
-    site = DATA / "dalian_harbour.geojson"
-    assert "angle" in refused(capsys, "plan", site, "--spacing", "80", "--angle", angle, "-o", tmp_path / "plan.geojson")
+    """Such an angle is refused as the option's value."""
+    plan = ["plan", DATA / "dalian_harbour.geojson", "--spacing", "80", "--angle", angle, "-o", tmp_path / "plan.geojson"]
+    assert f"Invalid value for '--angle': '{angle}' is not a finite number" in refused(capsys, *plan, usage=True)
 
 
 def test_two_areas_of_one_id(tmp_path, capsys):
