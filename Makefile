@@ -43,7 +43,7 @@ bench-triage: $(VENV)/installed
 	$(BIN)/python benchmarks/triage.py
 
 soak: $(VENV)/installed  ## damaged input by the hundred thousand: hours
-	$(BIN)/python -m pytest tests/soak --soak 50000
+	$(BIN)/python -m pytest tests/soak/test_soak.py --soak 100000
 
 docs: $(VENV)/installed  ## the pages that are generated: a minute or two
 	$(BIN)/python docs/generate.py

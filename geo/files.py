@@ -26,7 +26,7 @@ def read_bytes(source: str | Path) -> bytes:
 def refuse_existing(path: Path, *, force: bool) -> None:
     """Raise InputError if a file is at `path` and not `force`, or can be no path here (a name that is too long)."""
     try:
-        exists = path.exists() and not path.is_dir()  # a folder cannot be overwritten: writing refuses it
+        exists = path.is_file()  # a folder cannot be overwritten: writing refuses it; devices and pipes take what comes
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror or error}); choose another place with -o") from None
     if exists and not force:
@@ -51,9 +51,13 @@ def write_files(contents: Mapping[Path, bytes | str], *, force: bool = False) ->
     written: dict[Path, Path] = {}
     try:
         for path, content in contents.items():
-            written[path] = _beside(path, content.encode("utf-8") if isinstance(content, str) else content)
+            data = content.encode("utf-8") if isinstance(content, str) else content
+            if _takes_a_stream(path):
+                path.write_bytes(data)
+            else:
+                written[path] = _beside(path, data)
         for path, beside in written.items():
-            beside.replace(path)
+            beside.replace(path.resolve())  # through a link, not over it
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror or error}); choose another place with -o") from None
     finally:
@@ -62,10 +66,16 @@ def write_files(contents: Mapping[Path, bytes | str], *, force: bool = False) ->
     return list(contents)
 
 
+def _takes_a_stream(path: Path) -> bool:
+    """Devices and pipes, such as /dev/null: a file renamed over them would replace them."""
+    return path.exists() and not path.is_file() and not path.is_dir()
+
+
 def _beside(path: Path, data: bytes) -> Path:
     """Write a file beside where it is to stand, under a name of its own, and return that. Raises OSError."""
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    path = path.resolve()
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name[:40]}.")
     try:

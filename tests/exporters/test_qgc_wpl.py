@@ -7,9 +7,11 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from pyproj import Geod
 
 from quarterdeck.exporters import qgc_plan, qgc_wpl
 from quarterdeck.exporters.export import Settings, export
@@ -84,6 +86,19 @@ def test_quadrotor_takes_off_shoots_on_survey_legs_only_and_returns(tmp_path, qu
             assert item.z == 40.0
     assert shot == 4
     assert next(legs, None) is None
+
+
+def test_px4_heads_along_the_track_and_ardupilot_is_told_no_yaw(tmp_path, quads):
+    """PX4's yaw is the geodesic's azimuth at the end of the leg that comes there; ArduPilot gets none."""
+    made = qgc_wpl.files(quads, Settings("px4"))["quad1.waypoints"]
+    places = [w for w in load(tmp_path, made) if w.command in (16, 22)][1:]
+    legs = [(a, b) for a, b in pairwise(places) if (a.x, a.y) != (b.x, b.y)]
+    assert len(legs) >= 4
+    for a, b in legs:
+        back = Geod(ellps="WGS84").inv(a.y, a.x, b.y, b.x)[1] + 180.0
+        assert abs((b.param4 - back + 180.0) % 360.0 - 180.0) < 0.1
+    ardupilot = load(tmp_path, qgc_wpl.files(quads, Settings())["quad1.waypoints"])
+    assert {w.param4 for w in ardupilot} == {0.0}
 
 
 def test_ugv_waits_at_its_tasks_in_whole_seconds(tmp_path, ugv):

@@ -1,6 +1,7 @@
 """Writing files: whole or not at all, all or none, never where they do not belong."""
 
 import os
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -66,3 +67,24 @@ def test_no_name_leads_out_of_its_folder(names):
         assert path.resolve() == path
         assert stem not in ("", ".", "..")
         assert len(stem.encode()) <= 110
+
+
+def test_a_pipe_is_written_into_not_over(tmp_path):
+    """What is no file, such as /dev/null, takes what is written, stays what it is, and needs no force."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with ThreadPoolExecutor() as pool:
+        heard = pool.submit(pipe.read_bytes)
+        write_file(pipe, "words")
+    assert heard.result() == b"words"
+    assert pipe.is_fifo()
+
+
+def test_a_link_is_written_through(tmp_path):
+    """A link to a file stays a link; the file that it names is the one overwritten."""
+    (tmp_path / "real").mkdir()
+    (tmp_path / "real" / "file").write_text("old")
+    (tmp_path / "link").symlink_to(tmp_path / "real" / "file")
+    write_file(tmp_path / "link", "new", force=True)
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "real" / "file").read_text() == "new"
