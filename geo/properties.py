@@ -48,7 +48,9 @@ _DOMAIN = Property({"enum": ["surface", "ground", "aerial"]}, "one of surface, g
 PROPERTIES: dict[str, dict[str, Property]] = {
     "area": {
         "id": _ID,
-        "priority": Property({"type": "integer", "minimum": 0}, "a whole number from 0", "higher ones first: by guards and `replan`, not by tracks"),
+        "priority": Property(
+            {"type": "integer", "minimum": 0}, "a whole number from 0", "higher ones first, in guards plans and `replan`"
+        ),
         "spacing": _number("a number above 0", "metres between neighbouring tracks (the paper's 2 delta)", **_POSITIVE),
         "width": _number(
             "a number above 0", "metres across the corridor along a line; lines only, and they need it", **_POSITIVE
