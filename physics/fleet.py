@@ -1,6 +1,6 @@
 # ruff: noqa: ARG002, D102 - the squads' methods are described once, in Squad; not every kind feels every influence
 """The fleet: all vehicles of a kind as one squad of arrays, with one way to guide, drive and read them whatever the
-kind.
+kind; and the squads together.
 """
 
 from abc import ABC, abstractmethod
@@ -60,11 +60,22 @@ class Squad(ABC):
     @property
     def course(self) -> np.ndarray:
         """(k, 2) direction of the leg that each is on; zeros for one that waits, holds or is done."""
+        start, end = self.ends[..., :2].transpose(1, 0, 2)
+        way, mode = end - start, self.tracks["mode"]
+        length = np.hypot(*way.T)
+        return way / np.where((length > 0) & ((mode == SAIL) | (mode == ROTATE)), length, np.inf)[:, None]
+
+    @property
+    def ends(self) -> np.ndarray:
+        """(k, 2, 3) metres: where the leg that each is on begins and ends."""
         t = self.tracks
         a, b = self.table[np.maximum(t["leg"] - 1, t["first"])], self.table[t["leg"]]
-        way = np.column_stack([b["x"] - a["x"], b["y"] - a["y"]])
-        length = np.hypot(*way.T)
-        return way / np.where((length > 0) & ((t["mode"] == SAIL) | (t["mode"] == ROTATE)), length, np.inf)[:, None]
+        return np.stack([np.column_stack([w["x"], w["y"], w["z"]]) for w in (a, b)], axis=1)
+
+    @property
+    def kind(self) -> np.ndarray:
+        """(k,) int8: the kind of leg that each is on, its place in `paths.LEGS`."""
+        return self.table["kind"][self.tracks["leg"]]
 
     @property
     def pace(self) -> np.ndarray:
@@ -269,11 +280,39 @@ class Multirotors(Squad):
 KINDS: dict[str, type[Squad]] = {"surface": Vessels, "ground": Rovers, "aerial": Multirotors}
 
 
-def form_squads(vehicles: Sequence[Vehicle], position: np.ndarray, heading: np.ndarray, seed: int = 0) -> list[Squad]:
-    """Return a squad for each domain that has vehicles. Raises InputError if a model's [dynamics] are wrong."""
-    squads = []
-    for domain, kind in KINDS.items():
-        index = np.array([i for i, v in enumerate(vehicles) if v.domain == domain], dtype=int)
-        if len(index):
-            squads.append(kind([vehicles[i] for i in index], index, position[index], heading[index], seed))
-    return squads
+class Fleet:
+    """All k vehicles: a squad for each domain that has some, and what they are together, in the order of `vehicles`.
+
+    Raises InputError if a model's [dynamics] are wrong.
+    """
+
+    def __init__(self, vehicles: Sequence[Vehicle], position: np.ndarray, heading: np.ndarray, seed: int = 0) -> None:
+        self.count = len(vehicles)
+        self.squads: list[Squad] = []
+        for domain, kind in KINDS.items():
+            index = np.array([i for i, v in enumerate(vehicles) if v.domain == domain], dtype=int)
+            if len(index):
+                self.squads.append(kind([vehicles[i] for i in index], index, position[index], heading[index], seed))
+
+    def poses(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return positions (k, 3) and headings (k,)."""
+        position, heading = np.empty((self.count, 3)), np.empty(self.count)
+        for squad in self.squads:
+            position[squad.index], heading[squad.index] = squad.pose()
+        return position, heading
+
+    def gather(self, name: str) -> np.ndarray:
+        """Return a squad's property, (k, ...), over the whole fleet."""
+        parts = [getattr(squad, name) for squad in self.squads]
+        out = np.empty((self.count, *parts[0].shape[1:]), parts[0].dtype)
+        for squad, part in zip(self.squads, parts, strict=True):
+            out[squad.index] = part
+        return out
+
+    def of(self, i: int) -> tuple[Squad, int]:
+        """Return the squad of vehicle `i`, and its place there."""
+        for squad in self.squads:
+            place = int(np.searchsorted(squad.index, i))
+            if place < len(squad.index) and squad.index[place] == i:
+                return squad, place
+        raise KeyError(i)

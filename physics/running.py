@@ -13,7 +13,7 @@ from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.director import Command, Director, Event, State, wake_time
 from quarterdeck.mission.mission import Mission, Waypoint
 from quarterdeck.physics.faults import Fault, active, next_change
-from quarterdeck.physics.fleet import Rovers, Squad, form_squads
+from quarterdeck.physics.fleet import Fleet, Rovers
 from quarterdeck.physics.navigation import REACH
 from quarterdeck.physics.paths import ROTATE, SAIL
 from quarterdeck.physics.rerouting import Rerouting
@@ -21,10 +21,10 @@ from quarterdeck.physics.rover import climb_parameters
 from quarterdeck.physics.sensing import Legs, Senses, Sensing
 from quarterdeck.physics.separation import give_way, stop_short
 from quarterdeck.physics.sightings import look_out
-from quarterdeck.physics.terrain import stand, steepness
+from quarterdeck.physics.terrain import Footing
 from quarterdeck.physics.trace import TraceBuilder
 from quarterdeck.physics.wind import MEMORY, step_gusts
-from quarterdeck.physics.world import GAP, HEIGHT, INCONSISTENT, World
+from quarterdeck.physics.world import INCONSISTENT, World
 
 DECIDE = 1.0  # s between calls of the director
 WARY = 0.2  # s between looks out for others where some are near
@@ -62,7 +62,7 @@ class Running:
         self.count = len(vehicles)
         routes = {route.vehicle: route.waypoints for route in self.mission.routes}
         self.position, self.heading = _starts(self.mission, routes)
-        self.squads = form_squads(vehicles, self.position, self.heading, self.seed)
+        self.fleet = Fleet(vehicles, self.position, self.heading, self.seed)
         self.home = np.array([v.home for v in vehicles], float).reshape(-1, 2)
         self.start = self.position[:, :2].copy()
         self.harbour = np.array([HARBOUR * v.model.length for v in vehicles])
@@ -97,20 +97,20 @@ class Running:
             self.senses = Senses(self.sensing, self.known, self.mission.site, vehicles, pose, random)
         self.router = self.senses.router if self.senses is not None else None
         blocking = [o for o in self.mission.site.obstacles if o.blocks & {v.domain for v in vehicles}]
-        self.ground, self.pitch, self.roll, self.lift = (np.zeros(self.count) for _ in range(4))
+        self.footing = Footing(vehicles)
         self.trouble: list[str] = []  # with the terrain
         if self.terrain is not None:
             self._lay(self.terrain)
         self.lookout = look_out(self.mission, self.terrain)
         self.world.add_obstacles(blocking, self.terrain)
-        up = np.column_stack([np.zeros((self.count, 2)), self.lift])
+        up = np.column_stack([np.zeros((self.count, 2)), self.footing.lift])
         self.world.add_vehicles(vehicles, self.position + up, self.heading)
 
     @property
     def finished(self) -> np.ndarray:
         """(k,) bool: has done all it was told and was neither given up nor lost, nor is without a way."""
         stuck = np.isin(np.arange(self.count), list(self.router.stuck) if self.router else [])
-        return self._gather("idle") & ~self.aground & ~self.lost & ~stuck
+        return self.fleet.gather("idle") & ~self.aground & ~self.lost & ~stuck
 
     def advance(self) -> None:
         """One step of the world."""
@@ -120,10 +120,10 @@ class Running:
         if self.wary and round(self.time / step) % max(1, round(WARY / step)) == 0:
             self._keep_clear()
         wind = self._wind(step)
-        for squad in self.squads:
+        for squad in self.fleet.squads:
             squad.guide(self.time, step)
             squad.drive(step, self.current, wind[squad.index])
-        position, heading = self._poses()
+        position, heading = self.fleet.poses()
         velocity = (position - self.position) / step
         rate = ((heading - self.heading + np.pi) % (2 * np.pi) - np.pi) / step
         rise = self._rise(self.terrain, position, heading) / step if self.terrain is not None else np.zeros(self.count)
@@ -132,12 +132,12 @@ class Running:
         for i in touched:
             body, psi, v, r = self.world.state(i)
             self.contact[i] = True
-            body, v = body - self.lift[i] * UP, v - rise[i] * UP
+            body, v = body - self.footing.lift[i] * UP, v - rise[i] * UP
             if np.abs(body - position[i]).max() > INCONSISTENT or abs(np.sin(psi - heading[i])) > INCONSISTENT:
                 if self.mission.vehicles[i].domain != "aerial":
                     body[2] = 0.0
-                self.world.place(i, body + self.lift[i] * UP, psi)
-                squad, place = self._squad(i)
+                self.world.place(i, body + self.footing.lift[i] * UP, psi)
+                squad, place = self.fleet.of(i)
                 squad.adopt(place, body, psi, v, r, self.current)
                 position[i], heading[i], velocity[i] = body, psi, (body - self.position[i]) / step
         falling = (self.velocity[:, 2] < -CRASH) | self.lost
@@ -171,7 +171,7 @@ class Running:
             if id in self.undelivered and not mute[id]:
                 command = self.undelivered.pop(id)
                 if not self.aground[i] and not self.lost[i]:
-                    squad, place = self._squad(i)
+                    squad, place = self.fleet.of(i)
                     squad.command(place, command.waypoints)
                     self.commands[id], self.told[i] = command.waypoints, 0
                     fresh.add(i)
@@ -180,17 +180,13 @@ class Running:
             self.senses.note()
             if self.router is not None:
                 self._reroute(self.senses, self.router, fresh)
-        over = bool((self._gather("idle") & ~self.lost | self.aground | self.lost & ~self.aerial).all())
+        over = bool((self.fleet.gather("idle") & ~self.lost | self.aground | self.lost & ~self.aerial).all())
         told = all(mute[e.vehicle] for e in self.events) and not (self.aground & ~self.given_up).any()
         self.done = over and told and wake_time(self.memory) == np.inf
 
     def record(self, builder: TraceBuilder) -> None:
         """Add a sample to the trace."""
-        tracks = np.empty(self.count, self.squads[0].tracks.dtype)
-        kind = np.empty(self.count, np.int8)
-        for squad in self.squads:
-            tracks[squad.index] = squad.tracks
-            kind[squad.index] = squad.table["kind"][squad.tracks["leg"]]
+        tracks = self.fleet.gather("tracks")
         builder.add(
             self.time,
             x=self.position[:, 0],
@@ -198,29 +194,27 @@ class Running:
             z=self.position[:, 2],
             heading=self.heading,
             speed=np.hypot(self.velocity[:, 0], self.velocity[:, 1]),
-            energy=self._gather("energy"),
+            energy=self.fleet.gather("energy"),
             cross=tracks["cross"] if self.senses is None else self._true_cross(tracks["cross"]),
             leg=tracks["leg"] - tracks["first"],
-            kind=kind,
+            kind=self.fleet.gather("kind"),
             turning=tracks["turning"],
             underway=self.underway,
             contact=self.contact,
-            ground=self.ground,
-            pitch=self.pitch,
+            ground=self.footing.ground,
+            pitch=self.footing.pitch,
         )
 
     def _lay(self, terrain: Terrain) -> None:
         """Lay the ground and stand the vehicles on it."""
-        self.rolling = np.array([v.domain == "ground" for v in self.mission.vehicles])
-        self.size = np.array([(v.model.length, v.model.width) for v in self.mission.vehicles])
-        self.steepest = np.full(self.count, np.inf)
-        for squad in self.squads:
+        for squad in self.fleet.squads:
             if isinstance(squad, Rovers):
                 squad.climb = np.array([climb_parameters(v.model) for v in squad.vehicles])
-                self.steepest[squad.index] = squad.climb["gradeability"]
-        if self.rolling.any():
+                self.footing.steepest[squad.index] = squad.climb["gradeability"]
+        rolling = self.footing.rolling
+        if rolling.any():
             ways = [r.xyz[:, :2] for r in self.mission.routes if self.mission.vehicle(r.vehicle).domain == "ground"]
-            places = np.concatenate([self.position[self.rolling, :2], *ways])
+            places = np.concatenate([self.position[rolling, :2], *ways])
             (west, south), (east, north) = (places.min(axis=0) - ASIDE).tolist(), (places.max(axis=0) + ASIDE).tolist()
             part = terrain.crop((west, south, east, north))
             if part is not None:
@@ -228,55 +222,36 @@ class Running:
         self._rise(terrain, self.position, self.heading)
 
     def _rise(self, terrain: Terrain, position: np.ndarray, heading: np.ndarray) -> np.ndarray:
-        """Take over the ground at where the vehicles come to, tilt the bodies to it, and return how far it rises, (k,).
+        """Tilt the bodies to the ground at where the vehicles come to, and return how far it rises, (k,).
 
-        One on ground that is steeper than it climbs, or not known, is given up. Vessels have the water at 0; aerial
-        vehicles fly above the ground, as their plan has it.
+        One on ground that is steeper than it climbs, or not known, is given up.
         """
-        height, pitch, roll = stand(terrain, position[:, :2], heading, *self.size.T)
-        steep = steepness(pitch, roll)
-        gone = self.rolling & ~self.aground & ((steep > self.steepest) | np.isnan(steep))
-        for i in np.flatnonzero(gone):
-            why = (
-                "the terrain is not known"
-                if np.isnan(steep[i])
-                else (
-                    f"the ground is {np.degrees(steep[i]):.1f} degrees steep, it climbs {np.degrees(self.steepest[i]):.0f}"
-                )
-            )
-            x, y, _ = position[i]
-            self.trouble.append(f"{self.ids[i]}: given up at {self.time:.0f} s, x {x:.1f} m, y {y:.1f} m: {why}")
-        self.aground |= gone
-        over = np.where(self.aerial, terrain.height(position[:, :2]), np.where(self.rolling, height, 0.0))
-        self.ground = np.where(np.isnan(over), self.ground, over)
-        self.pitch, self.roll = (np.where(self.rolling, np.nan_to_num(a), 0.0) for a in (pitch, roll))
-        before, gap = self.lift, (HEIGHT["ground"] / 2 + GAP) / np.cos(np.nan_to_num(steep))
-        self.lift = self.ground + np.where(self.rolling, gap, 0.0)
-        for i in np.flatnonzero(self.rolling) if self.world.bodies else ():
+        footing = self.footing
+        before = footing.lift
+        for i, why in footing.settle(terrain, position[:, :2], heading).items():
+            if not self.aground[i]:
+                x, y, _ = position[i]
+                self.trouble.append(f"{self.ids[i]}: given up at {self.time:.0f} s, x {x:.1f} m, y {y:.1f} m: {why}")
+                self.aground[i] = True
+        for i in np.flatnonzero(footing.rolling).tolist() if self.world.bodies else ():
             at = self.position[i] + before[i] * UP
-            self.world.place(int(i), at, float(self.heading[i]), float(self.pitch[i]), float(self.roll[i]))
-        for squad in self.squads:
+            self.world.place(i, at, float(self.heading[i]), float(footing.pitch[i]), float(footing.roll[i]))
+        for squad in self.fleet.squads:
             if isinstance(squad, Rovers):
-                squad.pitch = self.pitch[squad.index]
+                squad.pitch = footing.pitch[squad.index]
                 squad.active[:] &= ~self.aground[squad.index]
-        return self.lift - before
+        return footing.lift - before
 
     def _true_cross(self, believed: np.ndarray) -> np.ndarray:
         """Return (k,) cross-track errors in metres of where the vehicles are, not of where they believe to be."""
-        out = np.zeros(self.count)
-        for squad in self.squads:
-            t = squad.tracks
-            a, b = squad.table[np.maximum(t["leg"] - 1, t["first"])], squad.table[t["leg"]]
-            start, end = (np.column_stack([w["x"], w["y"], w["z"]]) for w in (a, b))
-            span, off = end - start, self.position[squad.index] - start
-            product = np.cross(span, off) / np.maximum(np.linalg.norm(span, axis=1), 1e-9)[:, None]
-            aerial = squad.vehicles[0].domain == "aerial"
-            out[squad.index] = np.linalg.norm(product, axis=1) if aerial else product[:, 2]
-        return np.where(believed != 0, out, 0.0)
+        start, end = self.fleet.gather("ends").transpose(1, 0, 2)
+        span, off = end - start, self.position - start
+        product = np.cross(span, off) / np.maximum(np.linalg.norm(span, axis=1), 1e-9)[:, None]
+        return np.where(believed != 0, np.where(self.aerial, np.linalg.norm(product, axis=1), product[:, 2]), 0.0)
 
     def _states(self, reached: np.ndarray, mute: Mapping[str, bool]) -> dict[str, State]:
         """Return what is known of each vehicle: of a mute or lost one what was last heard, and that it is not heard."""
-        idle, energy = self._gather("idle"), self._gather("energy")
+        idle, energy = self.fleet.gather("idle"), self.fleet.gather("energy")
         alive = ~self.aground & ~self.lost
         for i, id in enumerate(self.ids):  # noqa: A001
             if (mute[id] or not alive[i]) and id in self.heard:
@@ -292,7 +267,7 @@ class Running:
         before, self.suffering = self.suffering, active(self.faults, self.ids, self.time)
         self.change = next_change(self.faults, self.time)
         for i, id in enumerate(self.ids):  # noqa: A001
-            squad, place = self._squad(i)
+            squad, place = self.fleet.of(i)
             if self.suffering["lost"][i] and not self.lost[i]:
                 self.lost[i] = True
                 squad.command(place, ())
@@ -310,7 +285,7 @@ class Running:
         step = self.world.step
         deaf, present = self.suffering["gnss"], ~self.moored & ~self.aground & ~self.lost
         senses.step(self.time + step, step, pose, deaf, present, self.moored, self._legs())
-        for squad in self.squads:
+        for squad in self.fleet.squads:
             squad.error[:] = senses.error[squad.index]
             squad.tracks["slow"] = np.minimum(self.slow, senses.slow)[squad.index]
             squad.tracks["bias"] = senses.bias[squad.index]
@@ -325,7 +300,7 @@ class Running:
         present, believed = ~self.moored & ~self.aground & ~self.lost, senses.navigation.believed
         sure = senses.navigation.sure | self.sensing.mapping
         router.look(believed, sure, senses.angles, senses.ranges, REACH, self.suffering["comms"], present)
-        actual, mode = self._gather("reached"), self._legs().mode
+        actual, mode = self.fleet.gather("reached"), self.fleet.gather("tracks")["mode"]
         done = router.reached(actual)
         for i in senses.lidars.tolist():
             command = self.commands.get(self.ids[i], ())
@@ -338,7 +313,7 @@ class Running:
                 fresh=i in fresh, stalled=bool(senses.stalled[i]), others=others,
             )  # fmt: skip
             if detour is not None:
-                squad, place = self._squad(i)
+                squad, place = self.fleet.of(i)
                 squad.command(place, detour.waypoints)
                 router.detours[i] = detour
             if detour is not None and not detour.waypoints:
@@ -356,25 +331,19 @@ class Running:
 
     def _reached(self) -> np.ndarray:
         """Return (k,) how many waypoints of its last command each has reached."""
-        actual = self._gather("reached")
+        actual = self.fleet.gather("reached")
         return actual if self.router is None else self.router.reached(actual)
 
     def _legs(self) -> Legs:
         """Return the legs under way."""
-        start, end = np.zeros((self.count, 2)), np.zeros((self.count, 2))
-        speed, number, mode = np.zeros(self.count), np.zeros(self.count, int), np.zeros(self.count, np.int8)
-        for squad in self.squads:
-            t, index = squad.tracks, squad.index
-            a, b = squad.table[np.maximum(t["leg"] - 1, t["first"])], squad.table[t["leg"]]
-            start[index], end[index] = np.column_stack([a["x"], a["y"]]), np.column_stack([b["x"], b["y"]])
-            speed[index], number[index], mode[index] = b["speed"], t["leg"], t["mode"]
-        length = np.array([v.model.length for v in self.mission.vehicles])
-        aside = self._gather("aside")
-        return Legs(start, end, speed, self.slow, aside, np.hypot(*self.velocity[:, :2].T), length, number, mode)
+        start, end = self.fleet.gather("ends")[..., :2].transpose(1, 0, 2)
+        tracks, pace = self.fleet.gather("tracks"), np.hypot(*self.velocity[:, :2].T)
+        speed, aside = self.fleet.gather("pace"), self.fleet.gather("aside")
+        return Legs(start, end, speed, self.slow, aside, pace, self.length, tracks["leg"], tracks["mode"])
 
     def _moor(self) -> None:
         near = np.minimum(np.hypot(*(self.position[:, :2] - self.start).T), np.hypot(*(self.position[:, :2] - self.home).T))
-        idle = self._gather("idle")
+        idle = self.fleet.gather("idle")
         self.aground |= self.stuck > STUCK
         flying = self.aerial & (self.position[:, 2] > 1.0)
         self.moored = idle & ~flying & (np.hypot(*(self.position[:, :2] - self.home).T) < self.harbour)
@@ -383,7 +352,7 @@ class Running:
             self.world.set_underway(int(i), bool(underway[i]))
         self.underway = underway
         self._keep_clear()
-        for squad in self.squads:
+        for squad in self.fleet.squads:
             squad.active[:] = ~(self.moored | self.aground)[squad.index]
 
     def _keep_clear(self) -> None:
@@ -392,11 +361,11 @@ class Running:
         Before what lies still on its path it stops, if it can pass on neither side.
         """
         slow, want, instead = (np.empty(self.count) for _ in range(3))
-        course, aside, rest = self._gather("course"), self._gather("aside"), self._gather("rest")
+        course, aside, rest = self.fleet.gather("course"), self.fleet.gather("aside"), self.fleet.gather("rest")
         speed = np.hypot(self.velocity[:, 0], self.velocity[:, 1])
-        pace = np.where(self._gather("idle"), 0.0, self._gather("pace"))
+        pace = np.where(self.fleet.gather("idle"), 0.0, self.fleet.gather("pace"))
         present = ~self.moored & ~self.aground
-        give_way(self.position, course, speed, pace, self._gather("shifted"), self.keep, present, slow, want, instead)
+        give_way(self.position, course, speed, pace, self.fleet.gather("shifted"), self.keep, present, slow, want, instead)
         for i in map(int, np.flatnonzero((want != 0) & (want != aside))):
             reach = course[i] * min(speed[i] * 5.0, rest[i])
             if self._has_room(i, reach, course[i], want[i] - aside[i]):
@@ -416,7 +385,7 @@ class Running:
         creeps = self.time - self.stood > WAITS + 2.0 * np.arange(self.count)
         slow[creeps] = np.maximum(slow, CREEP * pace)[creeps]
         self.slow = slow
-        for squad in self.squads:
+        for squad in self.fleet.squads:
             squad.tracks["slow"], squad.tracks["want"] = slow[squad.index], want[squad.index]
 
     def _has_room(self, i: int, ahead: np.ndarray, course: np.ndarray, starboard: float) -> bool:
@@ -444,28 +413,6 @@ class Running:
         noise = self.random.standard_normal((self.count, 3))
         gust = step_gusts(self.gust, noise, airspeed, self.position[:, 2], self.gusts, step)
         return self.wind + gust
-
-    def _poses(self) -> tuple[np.ndarray, np.ndarray]:
-        position, heading = np.empty((self.count, 3)), np.empty(self.count)
-        for squad in self.squads:
-            position[squad.index], heading[squad.index] = squad.pose()
-        return position, heading
-
-    def _gather(self, name: str) -> np.ndarray:
-        """(k, ...) of a squad's property over the whole fleet."""
-        parts = [getattr(squad, name) for squad in self.squads]
-        out = np.empty((self.count, *parts[0].shape[1:]), parts[0].dtype)
-        for squad, part in zip(self.squads, parts, strict=True):
-            out[squad.index] = part
-        return out
-
-    def _squad(self, i: int) -> tuple[Squad, int]:
-        """Return the squad of fleet member `i`, and its place there."""
-        for squad in self.squads:
-            place = int(np.searchsorted(squad.index, i))
-            if place < len(squad.index) and squad.index[place] == i:
-                return squad, place
-        raise KeyError(i)
 
 
 def _prepared(geometry: MultiPolygon) -> MultiPolygon:

@@ -1,10 +1,49 @@
-"""How rovers stand on ground that is not flat, and whether they can get everywhere on it."""
+"""How vehicles stand on ground that is not flat, and whether they can get everywhere on it."""
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.mission import Mission
+from quarterdeck.physics.world import GAP, HEIGHT
+
+
+class Footing:
+    """How the k vehicles of a run stand: `ground` (k,) metres beneath each, `pitch` and `roll` radians, and `lift`, metres
+    from the plan's heights, which are above ground, to PyBullet's.
+
+    `rolling` (k,) bool are those on the ground, which climb at most `steepest` (k,) radians. Vessels have the water at 0;
+    aerial vehicles fly above the ground, as their plan has it. Until it is settled on a terrain all is flat, at 0.
+    """
+
+    def __init__(self, vehicles: Sequence[Vehicle]) -> None:
+        self.rolling = np.array([v.domain == "ground" for v in vehicles])
+        self.aerial = np.array([v.domain == "aerial" for v in vehicles])
+        self.size = np.array([(v.model.length, v.model.width) for v in vehicles])
+        self.steepest = np.full(len(vehicles), np.inf)
+        self.ground, self.pitch, self.roll, self.lift = (np.zeros(len(vehicles)) for _ in range(4))
+
+    def settle(self, terrain: Terrain, xy: np.ndarray, heading: np.ndarray) -> dict[int, str]:
+        """Take over the ground at (k, 2) metres; return which vehicles cannot be there, and why.
+
+        Where the ground is not known it stays as it was.
+        """
+        height, pitch, roll = stand(terrain, xy, heading, *self.size.T)
+        steep = steepness(pitch, roll)
+        over = np.where(self.aerial, terrain.height(xy), np.where(self.rolling, height, 0.0))
+        self.ground = np.where(np.isnan(over), self.ground, over)
+        self.pitch, self.roll = (np.where(self.rolling, np.nan_to_num(a), 0.0) for a in (pitch, roll))
+        gap = (HEIGHT["ground"] / 2 + GAP) / np.cos(np.nan_to_num(steep))
+        self.lift = self.ground + np.where(self.rolling, gap, 0.0)
+        return {
+            i: "the terrain is not known"
+            if np.isnan(steep[i])
+            else f"the ground is {np.degrees(steep[i]):.1f} degrees steep, it climbs {np.degrees(self.steepest[i]):.0f}"
+            for i in np.flatnonzero(self.rolling & ((steep > self.steepest) | np.isnan(steep))).tolist()
+        }
 
 
 def stand(
