@@ -11,10 +11,14 @@ from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from quarterdeck.geo.errors import InputError
 
+if TYPE_CHECKING:
+    import numpy as np
+
+_Speed = TypeVar("_Speed", float, "np.ndarray")
 DEFAULT_MODEL = {"surface": "otter", "ground": "husky", "aerial": "survey-quad"}
 
 
@@ -63,8 +67,8 @@ class VehicleModel:
         """Metres per second that it descends."""
         return self.descent_rate or self.climb_rate
 
-    def power(self, speed: float) -> float:
-        """Return watts drawn at `speed` m/s: idle plus a power law through the cruise figure."""
+    def power(self, speed: _Speed) -> _Speed:
+        """Return watts drawn at `speed` m/s, one or (n,): idle plus a power law through the cruise figure."""
         return self.power_idle + (self.power_cruise - self.power_idle) * (speed / self.speed) ** self.power_exponent
 
 

@@ -70,7 +70,7 @@ def _same_needs(mission: Mission, scenario: Scenario, reach: float) -> bool:
     """Whether each guard that is left is needed, and no more are: the site is as it was, all of it was to be seen, by
     guards none of which was spare, and nobody sees less far.
     """
-    layer = next(layer for layer in mission.layers if layer.name == "guards")
+    layer = mission.layer("guards")
     now, then = scenario.site, mission.site
     return (
         mission.feasible
@@ -101,7 +101,7 @@ def _confirmed(mission: Mission, scenario: Scenario, served: frozenset[str]) -> 
 
     One that an obstacle stood near that is gone does not count any more: it has not seen what the obstacle hid.
     """
-    layer = next(layer for layer in mission.layers if layer.name == "guards")
+    layer = mission.layer("guards")
     gone = shapely.union_all([o.polygon for o in mission.site.obstacles if o not in scenario.site.obstacles])
     return {
         i: (place, float(p["range"]))
@@ -144,7 +144,7 @@ def _left(
     all_needed: bool,
 ) -> tuple[np.ndarray, list[str | None]]:
     """Return the guards that are still needed, and the vehicle that was to pass each; in the order of the plan's tours."""
-    layer = next(layer for layer in mission.layers if layer.name == "guards")
+    layer = mission.layer("guards")
     places = shapely.get_coordinates(layer.geometries)
     inside = shapely.contains_xy(space.reach, places[:, 0], places[:, 1])
     turns = [(p["turn"] is None, p["turn"] or 0, i) for i, p in enumerate(layer.properties)]

@@ -18,7 +18,7 @@ from quarterdeck.geo.scenario import Scenario, Vehicle, as_multipolygon
 from quarterdeck.geo.triangulation import Triangulation, triangulate
 from quarterdeck.geo.visibility import visibility_polygons
 from quarterdeck.mission.guard_routes import Team, Tours, guard_layers, guard_route, paper_tours, shorter_tours
-from quarterdeck.mission.mission import Mission, undone
+from quarterdeck.mission.mission import Mission, undone_layer
 from quarterdeck.mission.timing import shortfalls
 
 Mode = Literal["optimised", "paper"]
@@ -100,7 +100,7 @@ def guards_mission(
         figures=figures,
         bounds={"makespan": tours.bound},
         reasons=(*reasons, *short),
-        layers=(*guard_layers(tours, team), *((undone([(rest, "unseen")]),) if rest.area > 0 else ())),
+        layers=(*guard_layers(tours, team), *((undone_layer([(rest, "unseen")]),) if rest.area > 0 else ())),
         input_hash=scenario.input_hash,
     )
 

@@ -79,7 +79,7 @@ class Layer:
     properties: tuple[Mapping[str, Any], ...]
 
 
-def undone(areas: Sequence[tuple[Any, str]]) -> Layer:
+def undone_layer(areas: Sequence[tuple[Any, str]]) -> Layer:
     """Return the layer `undone`: areas, shapely in metres, that are not covered or seen, each with why."""
     look = {"stroke": "#d62728", "fill": "#d62728", "fill-opacity": 0.3}
     told = tuple({"why": why, "m2": round(float(area.area), 3), **look} for area, why in areas)
@@ -92,8 +92,9 @@ class Mission:
 
     `method` and `parameters` say how it was made, `figures` what it comes to, `bounds` what nothing could beat. `reasons`
     say, one line each, why it is infeasible; it is feasible when there are none. `spacing` is the track spacing in metres
-    (None where nothing is covered by swaths); `layers` is for the eye. `lost` are vehicles that were given up, as they were
-    then: where they were last, with the energy that they had.
+    (None where nothing is covered by swaths). `layers` are for the eye; those of guards, and of what was surveyed or left
+    out, are what replanning starts from. `lost` are vehicles that were given up, as they were then: where they were last,
+    with the energy that they had.
     """
 
     name: str
@@ -123,3 +124,7 @@ class Mission:
     def vehicle(self, id: str) -> Vehicle:  # noqa: A002 - the field's own name
         """Return a vehicle by id."""
         return next(v for v in self.vehicles if v.id == id)
+
+    def layer(self, name: str) -> Layer:
+        """Return the layer of a name; an empty one where there is none."""
+        return next((layer for layer in self.layers if layer.name == name), Layer(name, (), ()))

@@ -75,8 +75,9 @@ def _place(route: Route, time: float) -> tuple[int, tuple[float, float, float]]:
 
 def with_surveyed(mission: Mission, tracks: Sequence[np.ndarray]) -> Layer:
     """Return the layer `surveyed`: the (n, 2) lines that were surveyed before this plan began, by earlier plans too."""
-    before = next((layer.geometries for layer in mission.layers if layer.name == SURVEYED), ())
-    lines = {line.wkb: line for line in (*before, *(LineString(t) for t in tracks if len(t) > 1))}
+    lines = {
+        line.wkb: line for line in (*mission.layer(SURVEYED).geometries, *(LineString(t) for t in tracks if len(t) > 1))
+    }
     return Layer(SURVEYED, tuple(lines.values()), tuple({"stroke": "#999999", "stroke-width": 1} for _ in lines))
 
 

@@ -15,7 +15,7 @@ from quarterdeck.geo.transit import Roadmap
 from quarterdeck.mission.changes import Changes
 from quarterdeck.mission.cover import cover, roadmaps, trackable
 from quarterdeck.mission.lines import plan_lines
-from quarterdeck.mission.mission import Layer, Mission, Route, unbroken, undone
+from quarterdeck.mission.mission import Layer, Mission, Route, unbroken, undone_layer
 from quarterdeck.mission.progress import Progress, with_surveyed
 from quarterdeck.mission.remaining import clipped, remaining_parts
 from quarterdeck.mission.routes import line_routes, survey_tracks
@@ -84,7 +84,7 @@ def _layers(left: Sequence[np.ndarray], gaps: MultiPolygon, rim: MultiPolygon) -
     """Return what is not done: the lines, for whoever replans next, and the areas, with why."""
     areas = [(g, why) for g, why in ((gaps, "left out"), (rim, "too near to what is new")) if g.area > 0]
     lines = Layer(LEFT_OUT, tuple(LineString(line) for line in left), tuple({"stroke": "#d62728"} for _ in left))
-    return (*((lines,) if left else ()), *((undone(areas),) if areas else ()))
+    return (*((lines,) if left else ()), *((undone_layer(areas),) if areas else ()))
 
 
 class _Access:
@@ -120,8 +120,7 @@ def _undone(
     """Return the (n, 2) lines still to be driven, by whose they are, and those that something new may have cut."""
     short = VISITED * float(mission.spacing or 0.0)
     every = [(r.vehicle, run) for r in mission.routes for run in unbroken(r.xyz[:, :2], r.survey)]
-    layer = next((layer.geometries for layer in mission.layers if layer.name == LEFT_OUT), ())
-    every += [(None, np.array(line.coords)) for line in layer]  # type: ignore[misc]
+    every += [(None, np.array(line.coords)) for line in mission.layer(LEFT_OUT).geometries]  # type: ignore[misc]
     parts = remaining_parts([run for _, run in every], progress.tracks, short)
     undone = [(owner, left) for (owner, _), left in zip(every, parts, strict=True)]
     if not (changes.obstacles or changes.withdrawn):

@@ -108,6 +108,5 @@ def energy_used(vehicle: Vehicle, track: Track) -> np.ndarray:
     sure = np.isfinite(track.energy)
     if sure.any():
         return np.interp(track.time, track.time[sure], track.energy[sure])
-    model = vehicle.model
-    power = model.power_idle + (model.power_cruise - model.power_idle) * (pace(track) / model.speed) ** model.power_exponent
+    power = vehicle.model.power(pace(track))
     return np.r_[0.0, np.cumsum(power[1:] * np.diff(track.time))] / 3600.0

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numba import njit
-from shapely.geometry.base import BaseGeometry
 
 from quarterdeck.geo.occupancy import FREE, OCCUPIED, UNKNOWN, Occupancy
 from quarterdeck.geo.scenario import Site
@@ -66,10 +65,12 @@ def agreement(made: Occupancy, site: Site) -> dict[str, float]:
     an obstacle's edge.
     """
     centres = made.to_metres(np.indices(made.cells.shape).reshape(2, -1).T + 0.5)
-    on = shapely.contains_xy(_prepared(site.operating), *centres.T)
+    shapely.prepare(site.operating)
+    on = shapely.contains_xy(site.operating, *centres.T)
     centres, ours = centres[on], made.cells.ravel()[on]
     solid = shapely.union_all([o.polygon for o in site.obstacles if "ground" in o.blocks])
-    real = ~shapely.contains_xy(_prepared(solid), *centres.T)
+    shapely.prepare(solid)
+    real = ~shapely.contains_xy(solid, *centres.T)
     known, walls = ours != UNKNOWN, shapely.points(centres[ours == OCCUPIED])
     both, either = np.count_nonzero((ours == FREE) & real), np.count_nonzero(known & ((ours == FREE) | real))
     right = shapely.dwithin(walls, solid.boundary, 1.5 * made.resolution)
@@ -78,11 +79,6 @@ def agreement(made: Occupancy, site: Site) -> dict[str, float]:
         "map_walls_right": float(right.mean()) if len(walls) else 1.0,
         "map_known": float(known[real].mean()) if real.any() else 1.0,
     }
-
-
-def _prepared(geometry: BaseGeometry) -> BaseGeometry:
-    shapely.prepare(geometry)
-    return geometry
 
 
 @njit(cache=True)

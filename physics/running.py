@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import shapely
-from shapely import LineString, MultiPolygon
+from shapely import LineString
 
 from quarterdeck.geo.scenario import Site
 from quarterdeck.geo.terrain import Terrain
@@ -80,7 +80,8 @@ class Running:
         self.told = np.zeros(self.count, int)
         self.done = False
         self.slow, self.stood = np.full(self.count, np.inf), np.zeros(self.count)
-        rooms = {d: _prepared(self.mission.site.navigable(d)) for d in sorted({v.domain for v in vehicles})}
+        rooms = {d: self.mission.site.navigable(d) for d in sorted({v.domain for v in vehicles})}
+        shapely.prepare(list(rooms.values()))
         self.room = [rooms[v.domain] for v in vehicles]
         self.ids = [v.id for v in vehicles]
         self.change, self.suffering = -1.0, active((), self.ids, 0.0)
@@ -413,12 +414,6 @@ class Running:
         noise = self.random.standard_normal((self.count, 3))
         gust = step_gusts(self.gust, noise, airspeed, self.position[:, 2], self.gusts, step)
         return self.wind + gust
-
-
-def _prepared(geometry: MultiPolygon) -> MultiPolygon:
-    """Return the geometry, made fast to ask about."""
-    shapely.prepare(geometry)
-    return geometry
 
 
 def _starts(mission: Mission, routes: Mapping[str, tuple[Waypoint, ...]]) -> tuple[np.ndarray, np.ndarray]:

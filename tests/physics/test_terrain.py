@@ -150,5 +150,5 @@ def test_no_grid_is_refused():
     """A single row, or a cell of no size."""
     with pytest.raises(InputError, match="2 x 2"):
         Terrain((0.0, 0.0), 1.0, np.zeros((1, 5)))
-    with pytest.raises(InputError, match="cell at least 0.01 m"):
+    with pytest.raises(InputError, match=r"cell at least 0\.01 m"):
         Terrain((0.0, 0.0), 0.0, np.zeros((5, 5)))
