@@ -9,6 +9,7 @@ from difflib import get_close_matches
 import numpy as np
 
 from quarterdeck.geo.errors import InputError
+from quarterdeck.mission import world
 
 KINDS = {
     "lost": "no power from then on: a vessel drifts, a rover stands, a multirotor falls",
@@ -32,6 +33,12 @@ class Fault:
         """Return it as `parse_fault` reads it."""
         kind = "" if self.kind == "lost" else f"{self.kind}:"
         return f"{kind}{self.vehicle}@{self.start:g}" + (f"-{self.end:g}" if math.isfinite(self.end) else "")
+
+
+def in_fast_world(faults: Sequence[Fault]) -> list[world.Fault]:
+    """Return those of the faults that the fast world knows: vehicles lost and radios silent."""
+    lost = [world.Fault(f.vehicle, f.start) for f in faults if f.kind == "lost"]
+    return lost + [world.Fault(f.vehicle, f.start, "mute", f.end) for f in faults if f.kind == "comms"]
 
 
 def read_faults(texts: Sequence[str], vehicles: Sequence[str], duration: float, seed: int) -> tuple[Fault, ...]:

@@ -11,14 +11,13 @@ from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.occupancy import Occupancy
 from quarterdeck.geo.scenario import Site
 from quarterdeck.geo.terrain import Terrain
-from quarterdeck.mission import world as fast_world
 from quarterdeck.mission.director import Director
-from quarterdeck.mission.fast import FastRun, run_fast
+from quarterdeck.mission.fast import run_fast
 from quarterdeck.mission.inspection import default_director
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.recovery import undone
 from quarterdeck.mission.triage.plan import METHOD
-from quarterdeck.physics.faults import Fault, read_faults
+from quarterdeck.physics.faults import in_fast_world, read_faults
 from quarterdeck.physics.mapping import agreement
 from quarterdeck.physics.report import Report, measure
 from quarterdeck.physics.running import DECIDE, Running
@@ -153,20 +152,13 @@ def simulate(
         triage=compared.document() if compared else None,
         servers=run.servers,
         undone=undone(run.memory),
-        fast=_fast(plan, expected, befalling, until) if expected and not triage else None,
+        fast=run_fast(plan, expected, in_fast_world(befalling), until=until) if expected and not triage else None,
     )
     made = None
     if sensing.mapping and run.router is not None:
         made = replace(run.router.shared.occupancy(), place=(mission.frame.lon, mission.frame.lat))
         report = replace(report, figures={**report.figures, **agreement(made, mission.site)})
     return Run(trace, report, compared, mission.site, made)
-
-
-def _fast(mission: Mission, director: Director, faults: Sequence[Fault], until: float) -> FastRun:
-    """Return what the fast world, which knows vehicles lost and radios silent, comes to."""
-    gone = [fast_world.Fault(f.vehicle, f.start) for f in faults if f.kind == "lost"]
-    silent = [fast_world.Fault(f.vehicle, f.start, "mute", f.end) for f in faults if f.kind == "comms"]
-    return run_fast(mission, director, gone + silent, until=until)
 
 
 def _check(

@@ -12,7 +12,7 @@ from quarterdeck.mission.mission import Mission, Route, Waypoint
 from quarterdeck.mission.triage.figures import figures
 from quarterdeck.mission.triage.outcome import Fate, Outcome, judge
 from quarterdeck.mission.triage.plan import run_plan, scenario_of, settings_of, team_of
-from quarterdeck.physics.faults import Fault
+from quarterdeck.physics.faults import Fault, in_fast_world
 from quarterdeck.physics.trace import Trace
 
 TIMES = ("found", "reported", "delivered", "reached", "treated")
@@ -45,15 +45,13 @@ def of_devices(faults: Sequence[Fault], mission: Mission) -> tuple[Fault, ...]:
 def compare(mission: Mission, memory: Any, trace: Trace, faults: Sequence[Fault], reason: str) -> Compared:
     """Return what became of the casualties in a run that left `trace` and the director's `memory`, beside the fast world.
 
-    `reason` says why the run was cut short, if it was. The fast world knows vehicles lost and radios silent, no other
-    faults.
+    `reason` says why the run was cut short, if it was.
     """
     tracks = {v: np.column_stack([trace.time, trace.x[:, i], trace.y[:, i]]) for i, v in enumerate(trace.vehicles)}
     run = world.Run(tracks, (), float(trace.time[-1]), memory, reason)
     scenario, team, settings = scenario_of(mission), team_of(mission), settings_of(mission)
     driven = judge(scenario, team, mission.parameters["method"], settings, run, seed=mission.seed)
-    kinds = {"lost": "stop", "comms": "mute"}
-    fast = run_plan(mission, [world.Fault(f.vehicle, f.start, kinds[f.kind], f.end) for f in faults if f.kind in kinds])  # type: ignore[arg-type]
+    fast = run_plan(mission, in_fast_world(faults))
     routes = tuple(_as_route(v, fast.run.tracks[v.id]) for v in mission.vehicles)
     return Compared(driven, fast, replace(mission, routes=routes))
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import click
 
 from quarterdeck.cli.output import console, emit, force_option, not_there, print_reason
-from quarterdeck.cli.simulate import Limit, print_report
+from quarterdeck.cli.simulate import Limit
+from quarterdeck.cli.verdict import print_report
 
 if TYPE_CHECKING:
     from quarterdeck.mission.mission import Mission

@@ -16,23 +16,19 @@ from quarterdeck.cli.output import (
     force_option,
     minutes,
     not_there,
-    print_reason,
     seed_option,
     tell_compiling,
     time_limit_option,
 )
 from quarterdeck.cli.parameters import Choice, Real
+from quarterdeck.cli.verdict import print_report
 from quarterdeck.geo.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-
-    from rich.console import Console
+    from collections.abc import Callable, Iterator
 
     from quarterdeck.mission.mission import Mission
-    from quarterdeck.physics.report import Report
     from quarterdeck.physics.simulate import Run
-    from quarterdeck.physics.task_report import TaskReport
 
 
 FILES = ("plan", "unmapped", "world", "terrain")  # the options that are files to read
@@ -268,103 +264,6 @@ def _progress(title: str) -> Iterator[Callable[[float, float], None]]:
                 bar.update(task, completed=done, total=max(expected, done), clock=clock)
 
         yield tell
-
-
-def print_report(mission: Mission, report: Report, *, how: str = "simulated") -> None:
-    """Print the verdict and its figures on standard error."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
-    screen = console()
-    table = Table(title=f"{mission.name}: {how}", title_justify="left", box=SIMPLE_HEAD)
-    for column in ("vehicle", "time", "energy", "off track", "obstacle", "vehicle"):
-        table.add_column(column, justify="left" if not table.columns else "right", no_wrap=True)
-    for v in report.vehicles[:60]:
-        table.add_row(
-            v.id,
-            f"{minutes(v.time)} {_change(v.time, v.time_planned)}",
-            f"{v.energy:,.{0 if v.energy >= 10 else 2}f} Wh {_change(v.energy, v.energy_planned)}",
-            f"{v.legs.p95:.2f} m",
-            "hit" if v.hits else _metres(v.clearance),
-            _metres(v.separation),
-        )
-    screen.print(table)
-    if report.tasks:
-        _print_tasks(screen, report.tasks)
-    figures = report.figures
-    words = [f"off track {figures['legs_p95']:.2f} m (95 %, straight legs)"]
-    if figures["coverage_planned"] is not None:
-        words.append(f"coverage {figures['coverage_driven']:.2%} driven of {figures['coverage_planned']:.2%} planned")
-    if figures["tasks_planned"]:
-        words.append(f"tasks {figures['tasks_served']} of {figures['tasks_planned']} served")
-    if (fast := figures.get("time_fast")) is not None:
-        tasks = f", {figures['tasks_served_fast']} tasks" if figures["tasks_planned"] else ""
-        words.append(f"took {minutes(figures['time'] or 0.0)}, in the fast world {minutes(fast)}{tasks}")
-    words.append(f"collisions {figures['collisions']}")
-    words.append(f"finished {figures['finished']} of {len(report.vehicles)}")
-    if figures["lost"]:
-        words.append(f"lost {figures['lost']}")
-    if figures["localisation_p95"] is not None:
-        words.append(f"localised to {figures['localisation_p95']:.2f} m (95 %, worst vehicle)")
-    if figures.get("map_known") is not None:
-        words.append(
-            f"map: {figures['map_known']:.1%} of the free ground known, {figures['map_free_iou']:.1%} of it right (IoU), "
-            f"{figures['map_walls_right']:.1%} of the walls"
-        )
-    screen.print("; ".join(words))
-    for note in report.notes:
-        print_reason(screen, "note", note)
-    if report.triage is not None:
-        _print_triage(screen, report.triage)
-    for reason in report.reasons:
-        print_reason(screen, "failed", reason)
-    if report.passed:
-        screen.print("passed", style="bold")
-
-
-def _print_triage(screen: Console, triage: Mapping[str, Any]) -> None:
-    """Print what became of the casualties, the fast world's beside the run's."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
-    from quarterdeck.cli.triage import ROWS
-
-    table = Table(title=f"triage, {triage['method']}", title_justify="left", box=SIMPLE_HEAD)
-    for column in ("", "fast world", "this run"):
-        table.add_column(column, justify="right" if column else "left")
-    for name, (label, form) in ROWS.items():
-        table.add_row(label, *("-" if value is None else form.format(value) for value in triage["figures"][name]))
-    screen.print(table)
-
-
-def _print_tasks(screen: Console, tasks: Sequence[TaskReport]) -> None:
-    """Print when tasks were to be done and when they were."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
-    table = Table(title="tasks, as planned in brackets", title_justify="left", box=SIMPLE_HEAD)
-    for column in ("task", "vehicle", "came", "began", "left", "waited"):
-        table.add_column(column, justify="left" if column in ("task", "vehicle") else "right", no_wrap=True)
-    for task in tasks[:60]:
-        plan, drive = task.planned, task.driven
-        who = drive.vehicle if drive else "-"
-        pairs = [
-            f"{minutes(getattr(drive, name)).removeprefix('0:') if drive else '-'} "
-            f"({minutes(getattr(plan, name)).removeprefix('0:') if plan else '-'})"
-            for name in ("arrival", "begin", "leave")
-        ]
-        waits = f"{drive.waited:.0f} s" if drive else "-"
-        table.add_row(task.id, who if plan and who == plan.vehicle else f"{who} ({plan.vehicle if plan else '-'})", *pairs,
-                      f"{waits} ({f'{plan.waited:.0f} s' if plan else '-'})")  # fmt: skip
-    screen.print(table)
-
-
-def _metres(distance: float | None) -> str:
-    return "" if distance is None else f"{distance:.1f} m"
-
-
-def _change(driven: float, planned: float) -> str:
-    return f"{(driven / planned - 1) * 100:+.1f} %" if planned > 0 else ""
 
 
 def _replanned(time: float, after: Mission) -> None:
