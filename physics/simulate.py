@@ -19,7 +19,7 @@ from quarterdeck.mission.recovery import undone
 from quarterdeck.mission.triage.plan import METHOD
 from quarterdeck.physics.faults import in_fast_world, read_faults
 from quarterdeck.physics.mapping import agreement
-from quarterdeck.physics.report import Report, measure
+from quarterdeck.physics.report import Report, check_limits, measure
 from quarterdeck.physics.running import DECIDE, Running
 from quarterdeck.physics.sensing import Sensing
 from quarterdeck.physics.terrain import check_terrain
@@ -75,6 +75,7 @@ def simulate(
     absent.
     """
     _check(mission, step, sample, current, wind, gusts)
+    check_limits(limits or {})
     if terrain is not None:
         check_terrain(terrain, mission)
     planned = max((max(r.duration, r.length / mission.vehicle(r.vehicle).speed) for r in mission.routes), default=0.0)

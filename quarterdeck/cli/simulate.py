@@ -138,7 +138,7 @@ def command(
 
     tell_compiling()
     with limited(time_limit, interruptible=True) as limit:
-        mission, run = execute(**options)
+        mission, run = execute(**options, casualties=bool(snapshots or casualties))
     if run.map is not None:
         from quarterdeck.geo.occupancy import write_map
 
@@ -162,9 +162,7 @@ def command(
         known = {o.id for o in mission.site.obstacles}
         strange = () if options["world"] else tuple(o for o in there.site.obstacles if o.id not in known)
         emit(draw(there, run.trace, run.report, strange=strange), picture, force=force)
-    if snapshots or casualties:
-        if run.triage is None:
-            raise InputError("--snapshots and --casualties are for plans of triage; use --picture and --report")
+    if run.triage is not None:
         from quarterdeck.exporters.casualties import casualties_geojson
         from quarterdeck.exporters.triage_picture import snapshots_png
 
@@ -200,18 +198,25 @@ def execute(
     seed: int,
     limits: tuple[tuple[str, float], ...],
     step: float,
+    casualties: bool = False,
 ) -> tuple[Mission, Run]:
-    """Execute a plan with the command's options; return its mission and the run, whose report tells them."""
-    options = dict(locals())
+    """Execute a plan with the command's options; return its mission and the run, whose report tells them.
+
+    Raises InputError if it is to tell of `casualties` and is no plan of triage.
+    """
+    options = {name: value for name, value in locals().items() if name != "casualties"}
     from quarterdeck.geo.reader import read_obstacles
     from quarterdeck.geo.terrain import read_terrain
     from quarterdeck.mission.planfile import read_plan
     from quarterdeck.mission.recovery import recovering
+    from quarterdeck.mission.triage.plan import METHOD
     from quarterdeck.physics.sensing import Sensing
     from quarterdeck.physics.simulate import simulate
 
     files = {name: digest(options[name]) for name in FILES if options[name]}
     mission = read_plan(plan)
+    if casualties and mission.method != METHOD:
+        raise InputError("--snapshots and --casualties are for plans of triage; use --picture and --report")
     strange = read_obstacles(unmapped, mission.frame) if unmapped else ()
     ground = read_terrain(terrain, mission.frame, mission.site.operating.bounds) if terrain else None
     there = read_obstacles(world, mission.frame) if world else None

@@ -117,7 +117,7 @@ def test_the_papers_field_goes_round_nothing_square_in_its_way(mow) -> None:
 
 
 def test_a_blocked_robot_stops_and_says_so(mow) -> None:
-    """Before a wall the robot stops short of it, the director is told, and it looks along the wall for its end."""
+    """Before a wall the robot stops short of it, the director is told, once, and it looks along the wall for its end."""
     told = []
 
     def director(time, states, events, memory):
@@ -130,7 +130,7 @@ def test_a_blocked_robot_stops_and_says_so(mow) -> None:
     sensing = Sensing(lidar=True, unmapped=(wall,))
     run = simulate(mission, director=director, sensing=sensing, duration=80.0)
     assert not run.report.figures["collisions"]
-    assert told[0].vehicle == "husky-1"
+    assert [e.vehicle for e in told] == ["husky-1"]
     assert np.ptp(run.trace.y) > 20
     assert math.hypot(told[0].data["x"] - 14, told[0].data["y"]) < 2.0
 

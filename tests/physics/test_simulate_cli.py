@@ -69,10 +69,13 @@ def test_failed_verdict_exits_1_and_names_the_limit(plan, capfd):
         (["--limit", "collisions"], "is not NAME=VALUE"),
         (["--current", "fast"], "two numbers with a comma"),
         (["--step", "0.07"], "divide a second"),
+        (["--snapshots", "s.png"], "are for plans of triage"),
+        (["--casualties", "c.geojson"], "are for plans of triage"),
     ],
 )
-def test_wrong_options_exit_2_with_one_line(plan, capfd, options, text):
+def test_wrong_options_exit_2_with_one_line(plan, capfd, monkeypatch, options, text):
     """Nothing is simulated, nothing written."""
+    monkeypatch.setattr("quarterdeck.physics.simulate.open_world", lambda _: pytest.fail("it is simulated"))
     assert run(plan, *options) == 2
     assert text in capfd.readouterr().err
 
