@@ -7,6 +7,7 @@ from shapely import MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
 from quarterdeck.geo.scenario import Area, Scenario, Site, as_multipolygon
+from quarterdeck.mission.guards import least_range
 from quarterdeck.mission.mission import Mission
 
 SLIVER = 0.5  # spacings: what is narrower is not worth a track
@@ -17,7 +18,7 @@ def gap_site(mission: Mission, missed: BaseGeometry) -> tuple[Scenario, MultiPol
 
     The operating area, the obstacles and the vehicles are the plan's. Shares are left to follow from speeds.
     """
-    width = SLIVER * (mission.spacing or float(mission.parameters.get("range", 0.0)))
+    width = SLIVER * (least_range(mission) if mission.spacing is None else mission.spacing)
     wide = shapely.buffer(shapely.buffer(missed, -width / 2, join_style="mitre"), width / 2, join_style="mitre")
     worth = as_multipolygon(shapely.intersection(wide, missed))
     parts = sorted(worth.geoms, key=lambda p: (-p.area, p.bounds))

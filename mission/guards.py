@@ -165,6 +165,11 @@ def vehicle_ranges(vehicles: Sequence[Vehicle], default: float | None) -> np.nda
     return np.array(ranges, dtype=float)
 
 
+def least_range(mission: Mission) -> float:
+    """Return how far, in metres, every vehicle of a guards mission sees: guards are planned for the one that sees least."""
+    return float(vehicle_ranges(mission.vehicles, mission.parameters.get("range")).min())
+
+
 def enter(space: Space, vehicles: tuple[Vehicle, ...], ranges: np.ndarray) -> tuple[Space, Team, MultiPolygon]:
     """Return the space with only the parts that a robot starts in, the robots with where they enter and leave it, and
     what of the target is in the other parts. Raises InputError if a robot starts outside or cannot come home.

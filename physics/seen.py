@@ -12,6 +12,7 @@ from quarterdeck.coverage.guards.space import space_of
 from quarterdeck.geo.scenario import Scenario
 from quarterdeck.geo.triangulation import triangulate
 from quarterdeck.geo.visibility import visibility_polygons
+from quarterdeck.mission.guards import least_range
 from quarterdeck.mission.mission import Mission
 from quarterdeck.physics.trace import Trace
 
@@ -31,7 +32,7 @@ def seen_fraction(mission: Mission, tracks: Sequence[LineString]) -> float:
 
 def unseen(mission: Mission, tracks: Sequence[LineString]) -> BaseGeometry:
     """Return the part of the area that is not seen from `tracks` in metres within the plan's range."""
-    reach = float(mission.parameters["range"])
+    reach = least_range(mission)
     space = space_of(Scenario(mission.name, mission.frame, mission.site, mission.vehicles))
     # GEOS cannot segmentize the line of who never moved.
     ways = [track if track.length == 0 else shapely.segmentize(track, STRIDE * reach) for track in tracks]

@@ -1,5 +1,7 @@
 """What is seen from tracks, walls counted."""
 
+from dataclasses import replace
+
 import pytest
 import shapely
 from shapely import LineString, MultiPolygon, box
@@ -7,8 +9,9 @@ from shapely import LineString, MultiPolygon, box
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.models import load_model
 from quarterdeck.geo.scenario import Area, Obstacle, Site, Vehicle
+from quarterdeck.mission.gaps import gap_site
 from quarterdeck.mission.mission import Mission
-from quarterdeck.physics.seen import seen_fraction
+from quarterdeck.physics.seen import seen_fraction, unseen
 
 
 def looking(area, reach, *obstacles):
@@ -26,6 +29,17 @@ def test_in_the_open_it_is_what_lies_within_range():
     seen = seen_fraction(looking(field, 15.0), [track])
     assert seen <= expected
     assert seen == pytest.approx(expected, rel=5e-3)
+
+
+def test_a_vehicles_own_range_is_what_it_sees():
+    """Whether the plan has a range for all, or none: guards were planned for the vehicles' own."""
+    field, track = box(0, 0, 100, 60), LineString([(20, 30), (80, 30)])
+    mission = looking(field, 15.0)
+    own = replace(mission, vehicles=tuple(replace(v, range=15.0) for v in mission.vehicles))
+    for default in (None, 40.0):
+        plan = replace(own, parameters={"range": default})
+        assert seen_fraction(plan, [track]) == seen_fraction(mission, [track])
+        assert [a.id for a in gap_site(plan, unseen(plan, [track]))[0].site.areas] == ["gap-1"]
 
 
 def test_a_wall_hides_what_is_behind_it():
