@@ -136,7 +136,7 @@ def _replanned(
         lost=frozenset(planned & now.given_up),
         back=dict.fromkeys(sorted(working - planned)),
         obstacles=(*(w for w in wrecks.values() if w.id not in known), *found),
-        gone=frozenset(known & again),
+        gone=frozenset(known & again) - {o.id for o in first.site.obstacles},  # what the site has stays, whatever its name
     )
     try:
         after = replan(now.mission, progress, changes)
