@@ -35,7 +35,7 @@ force_option = click.option("--force", is_flag=True, is_eager=True, help="Overwr
 terrain_option = click.option(
     "--terrain", metavar="FILE", help="Elevation model (GeoTIFF, ESRI ASCII grid): what flies holds its height above it."
 )
-tolerance_option = click.option("--tolerance", type=click.FloatRange(min=0, min_open=True), default=5.0, show_default=True,
+tolerance_option = click.option("--tolerance", type=Real(min=0, min_open=True), default=5.0, show_default=True,
                                 help="With --terrain: metres above or below that height between waypoints.")  # fmt: skip
 seed_option = click.option(
     "--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Seed of all that is random."
