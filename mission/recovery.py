@@ -7,7 +7,7 @@ When it is heard again, what it has done meanwhile counts, and it takes a part o
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import inf
 from typing import Any
 
@@ -38,9 +38,9 @@ class _Memory:
     """What is remembered: the plan followed and since when, what was done before it, who is missed and until when to wait.
 
     `following` is the route that each vehicle was last told and heard; `used` each vehicle's watt-hours at `since`;
-    `tracks` and `served` are all that was done before that plan; `given_up` who is held for lost; `wake` when the next
-    silence has lasted too long. `barred` are vehicles and the tasks to which they found no way, `undone` what earlier plans
-    told could not be done.
+    `tracks` and `served`, tasks and who did them, are all that was done before that plan; `given_up` who is held for lost;
+    `wake` when the next silence has lasted too long. `barred` are vehicles and the tasks to which they found no way,
+    `undone` what earlier plans told could not be done.
     """
 
     mission: Mission
@@ -49,7 +49,7 @@ class _Memory:
     since: float = 0.0
     inner: Any = None
     tracks: tuple[np.ndarray, ...] = ()
-    served: frozenset[str] = frozenset()
+    served: Mapping[str, str] = field(default_factory=dict)
     used: Mapping[str, float] | None = None
     missed: Mapping[str, float] | None = None
     given_up: frozenset[str] = frozenset()
@@ -84,7 +84,7 @@ def recovering(mission: Mission, *, delay: float = 0.0, tell: Tell | None = None
             now,
             missed={v: when for v, when in missed.items() if v not in due},
             given_up=(now.given_up | due) - back,
-            served=now.served | {e.subject for e in events if e.kind == "served"},
+            served={e.subject: e.vehicle for e in events if e.kind == "served"} | now.served,
             barred=now.barred | {(e.vehicle, e.subject) for e in barred},
         )
         plan = {r.vehicle: r for r in now.mission.routes}
@@ -126,7 +126,8 @@ def _replanned(
         positions={v: (s.x, s.y, s.z) for v, s in states.items()},
         energy={v: s.energy_used - used.get(v, 0.0) for v, s in states.items()},
         tracks=tuple(tracks),
-        served=now.served,
+        served=frozenset(now.served),
+        servers=now.served,
         headings={v: s.heading for v, s in states.items()},
     )
     wrecks = {w.id: w for v in sorted(now.given_up) if (w := _wreck(first, v, working, states)) is not None}

@@ -115,6 +115,7 @@ def _habits(parameters: Mapping[str, Any]) -> dict[str, Any]:
 def tasks_left(mission: Mission, tasks: Sequence[Task], progress: Progress, working: set[str]) -> tuple[Task, ...]:
     """Return the tasks that are not done as they are from now on; `working` are the ids of the vehicles that go on."""
     doer = {w.task: r.vehicle for r in mission.routes for w in r.waypoints if w.task in progress.served}
+    doer |= progress.servers
     old = {t.id: t for t in mission.tasks}
     begun = {t: b for t, b in _under_way(mission, progress).items() if b[0] in working and t not in progress.served}
     left = []
@@ -127,7 +128,7 @@ def tasks_left(mission: Mission, tasks: Sequence[Task], progress: Progress, work
             needs = task.needs | {_itself(vehicle)}
             left.append(replace(task, service_time=service, needs=needs, after=(), window=(0.0, float("inf"))))
         else:
-            left.append(_freed(task, doer, progress.time))
+            left.append(_freed(task, doer, progress))
     return tuple(left)
 
 
@@ -148,12 +149,13 @@ def _itself(vehicle: str) -> str:
     return f"is {vehicle}"
 
 
-def _freed(task: Task, doer: dict[str, str], time: float) -> Task:
+def _freed(task: Task, doer: dict[str, str], progress: Progress) -> Task:
     """Return a task without the predecessors that are done, its window counted from now."""
+    time = progress.time
     kept = {_itself(doer[a.task]) for a in task.after if a.task in doer and a.mode == "same_robot"}
     return replace(
         task,
-        after=tuple(a for a in task.after if a.task not in doer),
+        after=tuple(a for a in task.after if a.task not in progress.served),
         needs=task.needs | kept,
         window=(max(0.0, task.window[0] - time), max(0.0, task.window[1] - time)),
     )

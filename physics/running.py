@@ -183,7 +183,12 @@ class Running:
                 self._reroute(self.senses, self.router, fresh)
         over = bool((self.fleet.gather("idle") & ~self.lost | self.aground | self.lost & ~self.aerial).all())
         told = all(mute[e.vehicle] for e in self.events) and not (self.aground & ~self.given_up).any()
-        self.done = over and told and wake_time(self.memory) == np.inf
+        self.done = over and told and wake_time(self.memory) == np.inf and not self._heard_again(mute)
+
+    def _heard_again(self, mute: Mapping[str, bool]) -> bool:
+        """Return whether one that works is silent now and will be heard again: it can tell and be told."""
+        silent = {f.vehicle for f in self.faults if f.kind == "comms" and f.start <= self.time < f.end < np.inf}
+        return any(mute[i] and i in silent for i in np.array(self.ids)[~self.aground & ~self.lost])
 
     def record(self, builder: TraceBuilder) -> None:
         """Add a sample to the trace."""

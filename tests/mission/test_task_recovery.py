@@ -67,3 +67,18 @@ def test_a_new_task_is_done():
     before = plan()
     after = replan(before, planned_progress(before, 5.0), Changes(tasks=(Task("late", before.tasks[0].position),)))
     assert "late" in visited(after)
+
+
+def test_what_was_done_unheard_is_done():
+    """A task that no route has any more, done by a silent robot, bars no successor, and ties it to who has done it."""
+    before = plan()
+    first, *others = [t.id for t in before.tasks]
+    tasks = [replace(t, after=(Precedence(first, "same_robot"),)) if t.id == others[0] else t for t in before.tasks]
+    routes = [replace(r, waypoints=tuple(replace(w, task=None) for w in r.waypoints)) for r in before.routes]
+    start, changes = planned_progress(before, 0.0), Changes(speeds={"r1": before.vehicle("r1").speed})
+    for doer in ("r1", "r2"):
+        progress = replace(start, served=frozenset({first}), servers={first: doer})
+        after = replan(replace(before, routes=tuple(routes), tasks=tuple(tasks)), progress, changes)
+        assert after.feasible
+        assert sorted(visited(after)) == sorted(others)
+        assert others[0] in [w.task for r in after.routes if r.vehicle == doer for w in r.waypoints]

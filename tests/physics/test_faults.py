@@ -163,3 +163,17 @@ def test_a_mute_vehicle_is_not_heard_and_hears_nothing_new(mow) -> None:
     assert not mute[0][1]
     turn = run.trace.time[np.argmax(run.trace.x[:, 0])]
     assert 20 <= turn < 26
+
+
+@pytest.mark.usefixtures("needs_pybullet")
+def test_a_run_is_not_over_while_somebody_is_to_be_heard_again(mow) -> None:
+    """Who is silent when all have arrived can still tell and be told: the run goes on until it is heard."""
+    heard: list[tuple[float, str]] = []
+
+    def director(time, states, events, memory):
+        heard.extend((time, e.kind) for e in events if e.kind != "lost")
+        return ({} if memory else {"husky-1": Command((Waypoint(2.0, 0.0, task="t"),))}), True
+
+    run = simulate(mow("husky"), director=director, faults=["comms:husky-1@1-30"], duration=60.0)
+    assert sorted(heard) == [(30.0, "returned"), (30.0, "served")]
+    assert run.trace.time[-1] < 32.0
