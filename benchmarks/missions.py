@@ -40,6 +40,7 @@ class Watched:
     plans: list[tuple[float, Mission]] = field(default_factory=list)
     undone: tuple[str, ...] = ()
     undone_fast: tuple[str, ...] = ()
+    ends: dict[str, tuple[float, float]] = field(default_factory=dict)  # of the last commands that were heard
 
 
 def run_case(case: Any) -> tuple[Run, Watched]:
@@ -54,6 +55,8 @@ def run_case(case: Any) -> tuple[Run, Watched]:
                 watched.served[event.subject] += 1
                 watched.order.append(event.subject)
         commands, after = director(now, states, events, memory)
+        heard = {v: c.waypoints[-1] for v, c in commands.items() if c.waypoints and states[v].alive}
+        watched.ends |= {v: (w.x, w.y) for v, w in heard.items()}
         watched.undone = undone(after)
         return commands, after
 
@@ -92,7 +95,9 @@ def judge(case: Any, run: Run, watched: Watched) -> list[str]:
             continue
         if v.separation is not None and v.separation < 0:
             wrong.append(f"{v.id} overlapped {v.separation_vehicle} at {v.separation_time:.0f} s")
-        away = np.hypot(run.trace.x[-1, i] - vehicle.home[0], run.trace.y[-1, i] - vehicle.home[1])
+        # Who is never heard again does what it was told last: it may wait where it was to hear of others.
+        home = watched.ends.get(v.id, vehicle.home) if v.id in silent else vehicle.home
+        away = np.hypot(run.trace.x[-1, i] - home[0], run.trace.y[-1, i] - home[1])
         blind = 5.0 if any(f.kind == "gnss" for f in case.faults) else 0.0  # m: receivers have errors then
         if not v.finished or away > 4.0 * vehicle.model.length + blind:
             wrong.append(f"{v.id} is {away:.1f} m from home at the end" + (", not done" if not v.finished else ""))
@@ -131,7 +136,9 @@ def _undone(mission: Mission, run: Run, watched: Watched, last: Mission, unheard
     driven = np.column_stack([run.trace.x[surveying], run.trace.y[surveying]])
     step = spacing / 10
     planned = [t for v, r in zip(mission.vehicles, mission.routes, strict=True) for t in survey_tracks(v, r) if len(t) > 1]
-    places = np.concatenate([shapely.get_coordinates(shapely.segmentize(shapely.LineString(t), step)) for t in planned])
+    # GEOS cannot segmentize a line of no length: of a crumb of an area, or where corners are rounded.
+    lines = [line if line.length == 0 else shapely.segmentize(line, step) for line in map(shapely.LineString, planned)]
+    places = shapely.get_coordinates(lines)
     if len(driven):
         places = places[cKDTree(driven).query(places)[0] > 0.5 * spacing]
     wrecks = shapely.union_all([o.polygon for o in last.site.obstacles if o.id.startswith("wreck")])

@@ -84,7 +84,7 @@ def recovering(mission: Mission, *, delay: float = 0.0, tell: Tell | None = None
             now,
             missed={v: when for v, when in missed.items() if v not in due},
             given_up=(now.given_up | due) - back,
-            served={e.subject: e.vehicle for e in events if e.kind == "served"} | now.served,
+            served={e.subject: e.vehicle for e in events if e.kind == "served"} | dict(now.served),
             barred=now.barred | {(e.vehicle, e.subject) for e in barred},
         )
         plan = {r.vehicle: r for r in now.mission.routes}
