@@ -5,6 +5,7 @@ regions grow from the starts, then cells flow along the regions' graph until eve
 is computed first, so an impossible share becomes the nearest possible one and says why.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,13 +63,15 @@ def divide(
     *,
     seed: int = 0,
     turn_cost: float | np.ndarray = 1.0,
+    names: Sequence[object] | None = None,
 ) -> Division:
     """Divide the free hypervertices (R, C) bool among vehicles at `starts` (k, 2), distinct free rows and columns.
 
     `shares` (k,) are positive and sum to 1 within 1e-9; None means equal. `turn_cost` is what a turn costs in moves between
     path cells, one number or (k,): of the fairest divisions tried the one whose slowest vehicle is soonest done wins.
     Every region is 4-connected and has its vehicle's start; sizes are within one cell of the share where the geometry
-    allows. Cells that no start reaches are nobody's. Deterministic for a seed.
+    allows. Cells that no start reaches are nobody's. `names` (k,) are what the reasons call the vehicles, else by number.
+    Deterministic for a seed.
     Raises InputError for starts that are not distinct free cells, and for shares that do not fit.
     """
     free = np.ascontiguousarray(free, dtype=np.bool_)
@@ -111,7 +114,9 @@ def divide(
     labels = np.ascontiguousarray(straight.reshape(padded.shape)[1:-1, 1:-1])
     sizes = np.bincount(labels[labels >= 0], minlength=k)
     ratio = _worst(labels, floor)
-    return Division(labels, sizes, targets, floor, bound.proof, ratio, _reasons(free, reachable, shares, sizes, targets))
+    return Division(
+        labels, sizes, targets, floor, bound.proof, ratio, _reasons(free, reachable, shares, sizes, targets, names)
+    )
 
 
 def _checked(free: np.ndarray, starts: np.ndarray, shares: np.ndarray | None) -> np.ndarray:
@@ -155,7 +160,12 @@ def _time(labels: np.ndarray, shares: np.ndarray, turn_cost: float | np.ndarray)
 
 
 def _reasons(
-    free: np.ndarray, reachable: np.ndarray, shares: np.ndarray, sizes: np.ndarray, targets: np.ndarray
+    free: np.ndarray,
+    reachable: np.ndarray,
+    shares: np.ndarray,
+    sizes: np.ndarray,
+    targets: np.ndarray,
+    names: Sequence[object] | None,
 ) -> tuple[str, ...]:
     """Say in one line each which cells are nobody's and which vehicles are off their share by more than a cell."""
     reasons = []
@@ -170,7 +180,7 @@ def _reasons(
             why = "no connected exchange came closer"
         else:
             continue
-        reasons.append(f"vehicle {vehicle} has {size} cells, its share is {ask:.1f}: {why}")
+        reasons.append(f"vehicle {names[vehicle] if names else vehicle} has {size} cells, its share is {ask:.1f}: {why}")
     return tuple(reasons)
 
 

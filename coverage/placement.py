@@ -130,7 +130,7 @@ def place(
     shift = (x * spacing + cos * centre[0] + sin * centre[1], y * spacing - sin * centre[0] + cos * centre[1])
     grid = lay_grid(area, spacing, theta, shift)
     if not grid.hypervertices.any():
-        raise InputError(f"the area holds no 2 x 2 path cells at spacing {spacing:g} m; choose a smaller spacing")
+        raise InputError(f"the area has no room for tracks {spacing:g} m apart; choose a smaller spacing")
     _prove(grid, area)
     return Placement(grid, f, f1, f2, f3, tried)
 

@@ -257,7 +257,8 @@ def divided(
         here = np.flatnonzero(counts[:, part])
         inside = numbers == part
         entries = distinct_entries(inside, (grid.cells_at(starts[here]) + 0.5) / 2)
-        division: Division = divide(inside, entries, counts[here, part] / sizes[part], seed=seed)
+        names = [vehicles[i].id for i in here]
+        division: Division = divide(inside, entries, counts[here, part] / sizes[part], seed=seed, names=names)
         for vehicle, walk, own in zip(here, tours(division.labels, entries), range(len(here)), strict=True):
             masks[vehicle] |= division.labels == own
             walks[vehicle].append(walk)

@@ -40,7 +40,7 @@ def command(file: str, plan: str | None, site: str | None, within: float, as_jso
     found: Differences = []
     if document["type"] == "FeatureCollection":
         if site is None or plan is not None:
-            raise click.UsageError(f"{file} is a plan: name its site with --site, and no other plan")
+            raise click.UsageError(f"{file} is a plan: give the site that it was made of by --site, and no --plan")
         found += plan_again(document, file, site, within)
     else:
         options, files = _recorded(document, file)

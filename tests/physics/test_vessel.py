@@ -246,3 +246,13 @@ def test_wind_pushes_a_drifting_hull_downwind():
     """Broadside to a wind of 10 m/s, towards the north: it drifts north, slower than the wind."""
     state = coast("otter", np.zeros(COLUMNS), (0, 0), 60.0, wind=np.array([0.0, 10.0]))
     assert 1.0 < state[Y] < 100.0
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("pace", [0.5, 0.75, 1.0])
+def test_power_at_a_slower_speed_is_what_planners_reckon(model, pace):
+    """Watts drawn at a steady speed below cruise are the model file's power law, within five per cent."""
+    kind, (p,) = load_model(model), record(model)
+    speed = pace * kind.speed
+    thrust = (kind.dynamics["linear"][0] * speed + kind.dynamics["quadratic"][0] * speed**2) / 2
+    assert p["idle"] + p["watts"] * 2 * thrust**1.5 == pytest.approx(kind.power(speed), rel=0.05)
