@@ -19,7 +19,7 @@ from quarterdeck.physics.paths import ROTATE, SAIL
 from quarterdeck.physics.rerouting import Rerouting
 from quarterdeck.physics.rover import climb_parameters
 from quarterdeck.physics.sensing import Legs, Senses, Sensing
-from quarterdeck.physics.separation import give_way, stop_short
+from quarterdeck.physics.separation import creep_on, give_way, stop_short
 from quarterdeck.physics.sightings import look_out
 from quarterdeck.physics.terrain import Footing
 from quarterdeck.physics.trace import TraceBuilder
@@ -33,7 +33,7 @@ KEEP = 3.0  # lengths kept from other vehicles
 CRASH = 4.0  # m/s: a multirotor that meets the ground faster is out of the mission
 ASIDE = 50.0  # m about the ground routes in which PyBullet has the terrain
 UP = np.array([0.0, 0.0, 1.0])
-WAITS, CREEP = 8.0, 0.15  # s that a vehicle stands for others; of its pace that it then goes
+WAITS = 8.0  # s that a vehicle stands for others before it creeps on
 STUCK = 60.0  # s in contact without a pause: the vehicle is given up
 
 
@@ -67,6 +67,7 @@ class Running:
         self.start = self.position[:, :2].copy()
         self.harbour = np.array([HARBOUR * v.model.length for v in vehicles])
         self.length = np.array([v.model.length for v in vehicles])
+        self.hull = np.array([[v.model.length, v.model.width] for v in vehicles])
         self.keep = KEEP * self.length
         self.wary = False  # somebody is so near to another that a second is long
         self.brakes = np.array([v.model.acceleration for v in vehicles])
@@ -385,11 +386,10 @@ class Running:
         self.wary = stop_short(
             self.position, self.velocity, course, pace, want - aside, self.length, self.brakes, present, slow
         )
-        # Who has stood for others too long creeps on, the first in the list first: two may stand for each other.
         free = (slow > 0.05 * pace) | ~np.any(course != 0.0, axis=1) | ~present
         self.stood = np.where(free, self.time, self.stood)
-        creeps = self.time - self.stood > WAITS + 2.0 * np.arange(self.count)
-        slow[creeps] = np.maximum(slow, CREEP * pace)[creeps]
+        stands = self.time - self.stood > WAITS + 2.0 * np.arange(self.count)
+        creep_on(self.position, self.heading, self.velocity, pace, self.hull, self.brakes, present, stands, slow)
         self.slow = slow
         for squad in self.fleet.squads:
             squad.tracks["slow"], squad.tracks["want"] = slow[squad.index], want[squad.index]

@@ -11,6 +11,8 @@ from numba import njit
 HORIZON = 20.0  # s
 REACH = 0.65  # lengths from its middle that a hull may reach, whichever way it points
 BERTH = 0.45  # of the distance kept: how near one may pass what lies still; less than routes keep from wrecks
+CREEP = 0.15  # of its pace that one goes who has stood for others too long
+GAP = 0.1  # lengths that hulls keep apart while one creeps
 
 
 @njit(cache=True)
@@ -146,6 +148,63 @@ def stop_short(
             if np.hypot(px + wx * soon, py + wy * soon) < touch:
                 slow[i] = 0.0
     return near
+
+
+@njit(cache=True)
+def creep_on(
+    position: np.ndarray,
+    heading: np.ndarray,
+    velocity: np.ndarray,
+    pace: np.ndarray,
+    hull: np.ndarray,
+    brake: np.ndarray,
+    present: np.ndarray,
+    stands: np.ndarray,
+    slow: np.ndarray,
+) -> None:
+    """Raise `slow` (k,) to CREEP of its pace for each that `stands` (k,) too long for others and has room to creep ahead.
+
+    Two may stand for each other. The first in the list creeps first; nobody to where its hull, (k, 2) length and width in
+    metres, would come within GAP of another's, as that one moves or creeps, unless it gets away from it. `heading` (k,)
+    radians, `velocity` (k, 3) m/s over ground.
+    """
+    motion = velocity.copy()
+    for i in range(len(position)):
+        if not (stands[i] and present[i]):
+            continue
+        speed = max(CREEP * pace[i], np.hypot(velocity[i, 0], velocity[i, 1]))
+        ux, uy = speed * np.cos(heading[i]), speed * np.sin(heading[i])
+        ahead = 1.5 + speed / brake[i]  # s: the next call is one away
+        clear = True
+        for j in range(len(position)):
+            px, py, pz = position[j] - position[i]
+            touch = REACH * (hull[i, 0] + hull[j, 0])
+            wx, wy = motion[j, 0] - ux, motion[j, 1] - uy
+            if j == i or not present[j] or abs(pz) > touch + abs(motion[j, 2]) * ahead:
+                continue
+            if np.hypot(px, py) > touch + np.hypot(wx, wy) * ahead:
+                continue
+            before = _gap(px, py, heading[i], heading[j], hull[i], hull[j])
+            for soon in np.linspace(0.0, ahead, 5)[1:]:
+                after = _gap(px + wx * soon, py + wy * soon, heading[i], heading[j], hull[i], hull[j])
+                clear &= after > min(GAP * 0.5 * (hull[i, 0] + hull[j, 0]), before)
+        if clear:
+            slow[i] = max(slow[i], CREEP * pace[i])
+            motion[i, 0], motion[i, 1] = ux, uy
+
+
+@njit(cache=True)
+def _gap(px: float, py: float, one: float, other: float, mine: np.ndarray, theirs: np.ndarray) -> float:
+    """Return at least how far apart two boxes are, metres, along the axes of both; below 0 where they overlap.
+
+    The other's middle is at `px`, `py` from the one's; they head `one` and `other`; `mine` and `theirs` are length, width.
+    """
+    gap = -np.inf
+    for axis in (one, one + 0.5 * np.pi, other, other + 0.5 * np.pi):
+        reach = mine[0] * abs(np.cos(one - axis)) + mine[1] * abs(np.sin(one - axis))
+        reach += theirs[0] * abs(np.cos(other - axis)) + theirs[1] * abs(np.sin(other - axis))
+        gap = max(gap, abs(px * np.cos(axis) + py * np.sin(axis)) - 0.5 * reach)
+    return gap
 
 
 @njit(cache=True)
