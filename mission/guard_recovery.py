@@ -36,7 +36,7 @@ def guards_from_now(
     are added. What cannot be seen any more, for want of a way or of energy, is told as an area, and makes it infeasible.
     """
     ranges = vehicle_ranges(scenario.vehicles, mission.parameters.get("range"))
-    whole, team, lonely = enter(space_of(scenario), scenario.vehicles, ranges)
+    whole, team, lonely = enter(space_of(scenario), scenario.vehicles, ranges, under_way=True)
     if mission.parameters.get("inspect") == "border":
         whole = replace(whole, target=border_of(whole.target))
     mesh = triangulate(whole.sight)

@@ -170,12 +170,15 @@ def least_range(mission: Mission) -> float:
     return float(vehicle_ranges(mission.vehicles, mission.parameters.get("range")).min())
 
 
-def enter(space: Space, vehicles: tuple[Vehicle, ...], ranges: np.ndarray) -> tuple[Space, Team, MultiPolygon]:
+def enter(
+    space: Space, vehicles: tuple[Vehicle, ...], ranges: np.ndarray, *, under_way: bool = False
+) -> tuple[Space, Team, MultiPolygon]:
     """Return the space with only the parts that a robot starts in, the robots with where they enter and leave it, and
-    what of the target is in the other parts. Raises InputError if a robot starts outside or cannot come home.
+    what of the target is in the other parts. Raises InputError if a robot starts outside or cannot come home. One that is
+    `under_way` starts where it has come to, such as without fixes, and enters the nearest part from there.
     """
     parts = shapely.get_parts(space.reach)
-    starts = [_enter(space, parts, v, v.start, "starts") for v in vehicles]
+    starts = [_enter(space, parts, v, v.start, "" if under_way else "starts") for v in vehicles]
     homes = [_enter(space, parts, v, v.home, "ends") for v in vehicles]
     for vehicle, (start, _), (home, _) in zip(vehicles, starts, homes, strict=True):
         if start != home:
@@ -200,10 +203,13 @@ def _refuse_lonely(space: Space, lonely: MultiPolygon) -> None:
 def _enter(
     space: Space, parts: np.ndarray, vehicle: Vehicle, xy: tuple[float, float], word: str
 ) -> tuple[int, tuple[float, float]]:
-    """Return the part nearest to a place that a vehicle may be in, and the place there; a berth may be near the quay."""
+    """Return the part nearest to a place that a vehicle may be in, and the place there; a berth may be near the quay.
+
+    `word` is what it does there; empty where it is there already, wherever that is.
+    """
     away = shapely.distance(parts, shapely.Point(xy))
     part = int(np.argmin(away))
-    if away[part] > 1.2 * vehicle.clearance + 1e-6:
+    if word and away[part] > 1.2 * vehicle.clearance + 1e-6:
         holes = space.sight.buffer(0).envelope.covers(shapely.Point(xy))
         where = "in an obstacle or outside the area" if holes else "outside the area"
         raise InputError(f"vehicle {vehicle.id!r} {word} {where}, {away[part]:.3g} m from where it may be; move it inside")

@@ -5,6 +5,7 @@ import pytest
 import shapely
 
 from quarterdeck.coverage.guards.certificate import uncovered_by_shadows
+from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.models import load_model
 from quarterdeck.geo.scenario import Area, Obstacle, Scenario, Site, Vehicle, as_multipolygon
@@ -127,3 +128,14 @@ def test_replan_takes_guards_plans_and_its_plans_pass_the_check(plan: tuple[Scen
     assert after.feasible
     assert unproved(after) == []
     assert {r.vehicle for r in after.routes} == {"a", "c"}
+
+
+def test_one_that_has_come_outside_comes_back_in(plan: tuple[Scenario, Mission]) -> None:
+    """A robot that has drifted over the border goes on from there; a plan that begins there is refused."""
+    given, mission = plan
+    vehicles = (replace(given.vehicles[0], start=(-3.0, 1.0), end=(1.0, 1.0)), *given.vehicles[1:])
+    with pytest.raises(InputError, match="'a' starts outside"):
+        plan_guards(replace(given, vehicles=vehicles), range=RANGE)
+    after = guards_from_now(mission, replace(given, vehicles=vehicles), frozenset())
+    assert after.feasible
+    assert after.routes[0].xyz[0, 0] == -3.0
