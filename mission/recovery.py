@@ -38,9 +38,9 @@ class _Memory:
     """What is remembered: the plan followed and since when, what was done before it, who is missed and until when to wait.
 
     `following` is the route that each vehicle was last told and heard; `used` each vehicle's watt-hours at `since`;
-    `tracks` and `served`, tasks and who did them, are all that was done before that plan; `given_up` who is held for lost;
-    `wake` when the next silence has lasted too long. `barred` are vehicles and the tasks to which they found no way,
-    `undone` what earlier plans told could not be done.
+    `tracks` and `served`, tasks and who did them, are what was done before that plan (of guards: since then); `given_up`
+    who is held for lost; `wake` when the next silence has lasted too long. `barred` are vehicles and the tasks to which
+    they found no way, `undone` what earlier plans told could not be done.
     """
 
     mission: Mission
@@ -79,15 +79,21 @@ def recovering(mission: Mission, *, delay: float = 0.0, tell: Tell | None = None
         missed |= {e.vehicle: time + delay for e in events if e.kind == "lost" and e.vehicle not in now.given_up | heard}
         due = frozenset(v for v, when in missed.items() if when <= time)
         back = now.given_up & heard
+        plan = {r.vehicle: r for r in now.mission.routes}
+        served = {
+            e.subject: e.vehicle
+            for e in events
+            # Guards' numbers hold for one plan: what was seen unheard by an earlier one is seen again.
+            if e.kind == "served" and (mission.method != "guards" or now.following.get(e.vehicle) is plan.get(e.vehicle))
+        }
         barred = [e for e in events if e.kind == "unreachable" and (e.vehicle, e.subject) not in now.barred and e.subject]
         now = replace(
             now,
             missed={v: when for v, when in missed.items() if v not in due},
             given_up=(now.given_up | due) - back,
-            served={e.subject: e.vehicle for e in events if e.kind == "served"} | dict(now.served),
+            served=served | dict(now.served),
             barred=now.barred | {(e.vehicle, e.subject) for e in barred},
         )
-        plan = {r.vehicle: r for r in now.mission.routes}
         stale = {v for v in heard & plan.keys() if now.following.get(v) is not plan[v]}  # replanned while it was silent
         if due & plan.keys() or back or stale or barred:
             after = _replanned(now, mission, time, states, _found([e.data["found"] for e in barred]), tell)
@@ -155,6 +161,7 @@ def _replanned(
         since=time,
         inner=None,
         tracks=tuple(tracks),
+        served={} if after.method == "guards" else now.served,  # its layer says what is seen
         used={v: s.energy_used for v, s in states.items()},
         undone=tuple(dict.fromkeys(left)),
     )

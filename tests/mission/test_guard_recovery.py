@@ -9,11 +9,13 @@ from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.models import load_model
 from quarterdeck.geo.scenario import Area, Obstacle, Scenario, Site, Vehicle, as_multipolygon
+from quarterdeck.mission.director import Event, State
 from quarterdeck.mission.guard_check import unproved
 from quarterdeck.mission.guard_recovery import guards_from_now
 from quarterdeck.mission.guards import plan_guards
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.progress import planned_progress
+from quarterdeck.mission.recovery import recovering
 from quarterdeck.mission.replan import Changes, replan
 
 BORDER = shapely.box(0, 0, 60, 40)
@@ -55,6 +57,19 @@ def moved(mission: Mission, time: float, stopped: dict[str, float]) -> tuple[tup
         replace(v, start=progress.positions[v.id][:2], end=v.home) for v in mission.vehicles if v.id not in stopped
     )
     return working, progress.served
+
+
+def test_a_guard_confirmed_before_a_plan_confirms_none_of_it(plan: tuple[Scenario, Mission]) -> None:
+    """Each plan numbers its guards anew: one that is seen before two losses is one that is seen after both, no more."""
+    _, mission = plan
+    told: list[Mission] = []
+    director = recovering(mission, tell=lambda _, after: told.append(after))
+    states = {v.id: State(*v.start) for v in mission.vehicles}
+    first = next(w.task for w in mission.routes[0].waypoints if w.task)
+    _, memory = director(0.0, states, (), None)
+    _, memory = director(1.0, states, (Event("served", "a", first), Event("lost", "c")), memory)
+    _, memory = director(2.0, states, (Event("lost", "b"),), memory)
+    assert [sum(p["seen"] for p in after.layer("guards").properties) for after in told] == [1, 1]
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.8])
