@@ -86,6 +86,9 @@ def judge(case: Any, run: Run, watched: Watched) -> list[str]:
     }
     silent = {f.vehicle for f in case.faults if f.kind == "comms" and f.end == float("inf")}
     last = watched.plans[-1][1] if watched.plans else mission
+    moved = {
+        v.id: v.home for v in last.vehicles for _, p in watched.plans if f"{v.id}: its end is in" in "\n".join(p.reasons)
+    }
     wrong = []
     for i, v in enumerate(report.vehicles):
         vehicle = mission.vehicles[i]
@@ -96,7 +99,7 @@ def judge(case: Any, run: Run, watched: Watched) -> list[str]:
         if v.separation is not None and v.separation < 0:
             wrong.append(f"{v.id} overlapped {v.separation_vehicle} at {v.separation_time:.0f} s")
         # Who is never heard again does what it was told last: it may wait where it was to hear of others.
-        home = watched.ends.get(v.id, vehicle.home) if v.id in silent else vehicle.home
+        home = watched.ends.get(v.id, vehicle.home) if v.id in silent else moved.get(v.id, vehicle.home)
         away = np.hypot(run.trace.x[-1, i] - home[0], run.trace.y[-1, i] - home[1])
         blind = 5.0 if any(f.kind == "gnss" for f in case.faults) else 0.0  # m: receivers have errors then
         if not v.finished or away > 4.0 * vehicle.model.length + blind:
