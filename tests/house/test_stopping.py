@@ -1,7 +1,6 @@
 """Time limits and Ctrl-C at the command line: what there is by then is kept, and told."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -41,6 +40,14 @@ def status(*arguments):
     with pytest.raises(SystemExit) as stop:
         main([str(a) for a in arguments])
     return stop.value.code
+
+
+@pytest.fixture(autouse=True)
+def heard():
+    """Have Ctrl-C heard by what is started here: what a shell runs in the background ignores it, and so do its children."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(scope="module")
@@ -113,19 +120,18 @@ def test_an_interrupted_plan_leaves_nothing(tmp_path):
 def test_an_interrupted_campaign_goes_on_where_it_was(hall, tmp_path):
     """Ctrl-C after the first run: its row is kept, and the campaign called again does the rest alone."""
     study = tmp_path / "study.toml"
-    study.write_text(f'plan = "{hall}"\nruns = 6\n')
+    study.write_text(f'plan = "{hall}"\nruns = 24\n')
     journal = tmp_path / "runs" / "runs.jsonl"
     command = [sys.executable, "-m", "quarterdeck", "campaign", str(study), "-o", str(journal.parent), "--jobs", "1"]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-    while process.poll() is None and not (journal.exists() and journal.read_text().count("\n") >= 2):
-        time.sleep(0.01)
-    os.kill(process.pid, signal.SIGINT)
-    assert process.wait() == 130, process.stderr.read()
-    assert process.stderr.read().strip() == "quarterdeck: interrupted"
-    process.stderr.close()
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        while process.poll() is None and not (journal.exists() and journal.read_text().count("\n") >= 2):
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        assert process.wait() == 130, process.stderr.read()
+        assert process.stderr.read().strip() == "quarterdeck: interrupted"
     kept = journal.read_text().splitlines()[1:]
-    assert 1 <= len(kept) < 6
+    assert 1 <= len(kept) < 24
     assert status("campaign", study, "-o", journal.parent, "--jobs", "1") == 0
     rows = journal.read_text().splitlines()[1:]
     assert rows[: len(kept)] == kept
-    assert sorted(json.loads(row)["number"] for row in rows) == list(range(6))
+    assert sorted(json.loads(row)["number"] for row in rows) == list(range(24))
