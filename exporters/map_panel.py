@@ -8,7 +8,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from quarterdeck.geo.palette import SITE
-from quarterdeck.mission.mission import Mission, Route
+from quarterdeck.mission.mission import Layer, Mission, Route
 from quarterdeck.physics.report import Report
 
 WATER, AREA, OBSTACLE, MISSED, STRANGE = "#f4f7fa", "#dcebf5", "#8c8c8c", "#d7191c", "#111111"
@@ -104,6 +104,7 @@ def legend(panel: Axes, mission: Mission, *, run: bool = False, strange: bool = 
         handles.append(Patch(facecolor=STRANGE, edgecolor=STRANGE, label="obstacle that the plan did not know"))
     if mission.tasks:
         handles.append(Line2D([], [], **TASK, label="task"))
+    handles += [_key(layer) for layer in mission.layers if any("stroke" in p for p in layer.properties)]
     if run:
         handles[0:2] = [
             Line2D([], [], color="#333333", linewidth=1.2, label="driven"),
@@ -114,3 +115,11 @@ def legend(panel: Axes, mission: Mission, *, run: bool = False, strange: bool = 
             Line2D([], [], **CONTACT, label="contact"),
         ]
     panel.legend(handles=handles, loc="lower left", ncols=2, fontsize=7, frameon=False, borderaxespad=0.0)
+
+
+def _key(layer: Layer) -> Patch | Line2D:
+    """The sign of a layer that has a colour of its own: what was surveyed before, what is undone, a triangulation."""
+    colour = next(p["stroke"] for p in layer.properties if "stroke" in p)
+    if all(geometry.geom_type.endswith("Polygon") for geometry in layer.geometries):
+        return Patch(facecolor=colour, alpha=0.16, label=layer.name)
+    return Line2D([], [], color=colour, linewidth=0.9, label=layer.name)
