@@ -29,7 +29,7 @@ SHOWN = 20  # differences that are printed; --json has all
 @click.option("--plan", help="The report's plan, where it does not lie where it lay.")
 @click.option("--site", help="The plan's site: it is planned again too, with its seed and parameters.")
 @click.option("--within", type=Real(min=0), default=0.0, show_default=True,
-              help="Fraction by which numbers may differ, as between processors; 0: to the last digit.")  # fmt: skip
+              help="By what numbers may differ: a fraction, near 0 an amount; 0: to the last digit.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Write all differences as JSON to standard output.")
 def command(file: str, plan: str | None, site: str | None, within: float, as_json: bool) -> int:
     """Run again what FILE came of, and print what differs: a report of `simulate`, or with --site a plan.
@@ -155,7 +155,7 @@ def _features(document: dict[str, Any]) -> dict[str, Any]:
 
 
 def differences(was: Any, now: Any, within: float = 0.0, where: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Yield (place, was, is) for what differs in two JSON documents; numbers may by the fraction `within`."""
+    """Yield (place, was, is) for what differs in two JSON documents; numbers may by `within`, near 0 an amount."""
     if isinstance(was, dict) and isinstance(now, dict):
         for key in [*was, *(k for k in now if k not in was)]:
             yield from differences(was.get(key), now.get(key), within, f"{where}.{key}" if where else key)
