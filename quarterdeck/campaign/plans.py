@@ -92,15 +92,11 @@ class PlanCase:
 @lru_cache(maxsize=2)
 def _mission(text: str) -> Mission:
     """Return the mission in a plan's text, read once a process."""
-    import tempfile
-    from pathlib import Path
-
+    from quarterdeck.geo.geojson import Document, parse
     from quarterdeck.mission.planfile import read_plan
 
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "plan.geojson"
-        path.write_text(text, encoding="utf-8")
-        return read_plan(path)
+    data = text.encode("utf-8")
+    return read_plan(Document("plan.geojson", data, parse(data)))
 
 
 def _case(number: int, seed: int, conditions: Mapping[str, Any], levels: Mapping[str, Any]) -> PlanCase:

@@ -93,15 +93,11 @@ def _apart(numbers: dict[str, Any], conditions: Mapping[str, Any]) -> dict[str, 
 @lru_cache(maxsize=2)
 def _site(text: str) -> Scenario:
     """Return the scenario in a site's text, read once a process."""
-    import tempfile
-    from pathlib import Path
-
+    from quarterdeck.geo.geojson import Document, parse
     from quarterdeck.geo.reader import read_scenario
 
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "site.geojson"
-        path.write_text(text, encoding="utf-8")
-        return read_scenario(path)
+    data = text.encode("utf-8")
+    return read_scenario(Document("site.geojson", data, parse(data)))
 
 
 def _case(number: int, seed: int, conditions: Mapping[str, Any], levels: Mapping[str, Any]) -> TriageCase:
