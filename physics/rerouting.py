@@ -5,7 +5,7 @@ saw counts when it is heard again. Where what was found bars the way ahead, a ro
 something to do. Where there is no way any more, it stops and says so.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,8 +16,11 @@ from shapely import LineString, MultiPolygon
 from quarterdeck.geo.gridpath import find_ways, nearest_free
 from quarterdeck.geo.occupancy import FREE, Occupancy, site_occupancy
 from quarterdeck.geo.scenario import Site, Vehicle, as_multipolygon
+from quarterdeck.mission.director import Event
 from quarterdeck.mission.mission import Waypoint
+from quarterdeck.physics.fleet import Fleet
 from quarterdeck.physics.mapping import WALL, Evidence, fuse, no_evidence
+from quarterdeck.physics.paths import ROTATE, SAIL
 
 CELL = 0.1  # m
 KNOWN = 0.3  # m: echoes so near to what the map has are of that: walls are not quite where a robot believes them
@@ -72,10 +75,6 @@ class Rerouting:
             self.detours.pop(i, None)
             self.stuck.discard(i)
             self.barred[i], self.stalled[i] = np.inf, np.inf
-
-    def driven(self, i: int, command: tuple[Waypoint, ...]) -> tuple[Waypoint, ...]:
-        """Return all waypoints of what robot `i` drives: its detour, or its command."""
-        return self.detours[i].waypoints if i in self.detours else command
 
     def look(
         self,
@@ -146,13 +145,62 @@ class Rerouting:
         cells = np.argwhere((self.map_of(i).values > WALL) & (self._clear_of(KNOWN)))
         return self._grid(i).to_metres(cells + 0.5)
 
-    def obstacles(self, i: int) -> MultiPolygon:
+    def _obstacles(self, i: int) -> MultiPolygon:
         """Return what robot `i` has found as polygons in metres."""
         half, at = 0.5 * self.shared.cell, self.found(i)
         cells = shapely.box(at[:, 0] - half, at[:, 1] - half, at[:, 0] + half, at[:, 1] + half)
         return as_multipolygon(shapely.union_all(cells).buffer(half, join_style="mitre").simplify(half))
 
-    def detour(
+    def drive_around(
+        self,
+        time: float,
+        fleet: Fleet,
+        believed: np.ndarray,
+        commands: Sequence[tuple[Waypoint, ...]],
+        fresh: Container[int],
+        stalled: np.ndarray,
+        present: np.ndarray,
+    ) -> list[Event]:
+        """Tell the robots of `fleet` whose way is barred to drive around; return an event of each that has no way any more.
+
+        They are at `believed` (k, 3), on `commands`, of which some are `fresh`; `stalled` (k,) are those that get no
+        further, `present` (k,) those at work.
+        """
+        events = []
+        actual, mode = fleet.gather("reached"), fleet.gather("tracks")["mode"]
+        done = self.reached(actual)
+        for i in self.lidars.tolist():
+            command = commands[i]
+            if done[i] >= len(command) or not present[i] or (mode[i] not in (SAIL, ROTATE) and i not in fresh):
+                continue
+            ahead = self._driven(i, command)[actual[i] :]
+            others = [
+                np.array([believed[j, :2], *((w.x, w.y) for w in self._driven(j, commands[j])[actual[j] :])])
+                for j in np.flatnonzero(present).tolist()
+                if j != i
+            ]
+            detour = self._detour(
+                i, time, believed[i, :2], command, int(done[i]), ahead,
+                fresh=i in fresh, stalled=bool(stalled[i]), others=others,
+            )  # fmt: skip
+            if detour is not None:
+                squad, place = fleet.of(i)
+                squad.command(place, detour.waypoints)
+                self.detours[i] = detour
+            if detour is not None and not detour.waypoints:
+                self.stuck.add(i)
+                x, y, _ = believed[i].tolist()
+                data = {"x": x, "y": y, "found": self._obstacles(i)}
+                stop, rest = command[detour.onward], command[detour.onward :]
+                task = next((w.task for w in rest if w.task and (w.x, w.y) == (stop.x, stop.y)), "")
+                events.append(Event("unreachable", self.vehicles[i].id, task, data))
+        return events
+
+    def _driven(self, i: int, command: tuple[Waypoint, ...]) -> tuple[Waypoint, ...]:
+        """Return all waypoints of what robot `i` drives: its detour, or its command."""
+        return self.detours[i].waypoints if i in self.detours else command
+
+    def _detour(
         self,
         i: int,
         time: float,

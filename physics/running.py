@@ -5,8 +5,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import shapely
-from shapely import LineString
 
 from quarterdeck.geo.scenario import Site
 from quarterdeck.geo.terrain import Terrain
@@ -15,25 +13,21 @@ from quarterdeck.mission.mission import Mission, Waypoint
 from quarterdeck.physics.faults import Fault, active, next_change
 from quarterdeck.physics.fleet import Fleet, Rovers
 from quarterdeck.physics.navigation import REACH
-from quarterdeck.physics.paths import ROTATE, SAIL
 from quarterdeck.physics.rerouting import Rerouting
 from quarterdeck.physics.rover import climb_parameters
 from quarterdeck.physics.sensing import Legs, Senses, Sensing
-from quarterdeck.physics.separation import creep_on, give_way, stop_short
 from quarterdeck.physics.sightings import look_out
 from quarterdeck.physics.terrain import Footing
 from quarterdeck.physics.trace import TraceBuilder
+from quarterdeck.physics.watch import WARY, Watch
 from quarterdeck.physics.wind import MEMORY, step_gusts
 from quarterdeck.physics.world import INCONSISTENT, World
 
 DECIDE = 1.0  # s between calls of the director
-WARY = 0.2  # s between looks out for others where some are near
 HARBOUR = 4.0  # lengths: so near its start or end a vehicle is being launched or recovered
-KEEP = 3.0  # lengths kept from other vehicles
 CRASH = 4.0  # m/s: a multirotor that meets the ground faster is out of the mission
 ASIDE = 50.0  # m about the ground routes in which PyBullet has the terrain
 UP = np.array([0.0, 0.0, 1.0])
-WAITS = 8.0  # s that a vehicle stands for others before it creeps on
 STUCK = 60.0  # s in contact without a pause: the vehicle is given up
 
 
@@ -67,10 +61,6 @@ class Running:
         self.start = self.position[:, :2].copy()
         self.harbour = np.array([HARBOUR * v.model.length for v in vehicles])
         self.length = np.array([v.model.length for v in vehicles])
-        self.hull = np.array([[v.model.length, v.model.width] for v in vehicles])
-        self.keep = KEEP * self.length
-        self.wary = False  # somebody is so near to another that a second is long
-        self.brakes = np.array([v.model.acceleration for v in vehicles])
         self.random = np.random.default_rng(self.seed)
         self.gust = np.zeros((self.count, MEMORY))
         self.velocity = np.zeros((self.count, 3))
@@ -80,10 +70,7 @@ class Running:
         self.commands: dict[str, tuple[Waypoint, ...]] = {}
         self.told = np.zeros(self.count, int)
         self.done = False
-        self.slow, self.stood = np.full(self.count, np.inf), np.zeros(self.count)
-        rooms = {d: self.mission.site.navigable(d) for d in sorted({v.domain for v in vehicles})}
-        shapely.prepare(list(rooms.values()))
-        self.room = [rooms[v.domain] for v in vehicles]
+        self.watch = Watch(vehicles, self.mission.site)
         self.ids = [v.id for v in vehicles]
         self.change, self.suffering = -1.0, active((), self.ids, 0.0)
         self.aerial = np.array([v.domain == "aerial" for v in vehicles])
@@ -119,7 +106,7 @@ class Running:
         step = self.world.step
         if self.time >= self.change:
             self._befall()
-        if self.wary and round(self.time / step) % max(1, round(WARY / step)) == 0:
+        if self.watch.wary and round(self.time / step) % max(1, round(WARY / step)) == 0:
             self._keep_clear()
         wind = self._wind(step)
         for squad in self.fleet.squads:
@@ -294,7 +281,7 @@ class Running:
         senses.step(self.time + step, step, pose, deaf, present, self.moored, self._legs())
         for squad in self.fleet.squads:
             squad.error[:] = senses.error[squad.index]
-            squad.tracks["slow"] = np.minimum(self.slow, senses.slow)[squad.index]
+            squad.tracks["slow"] = np.minimum(self.watch.slow, senses.slow)[squad.index]
             squad.tracks["bias"] = senses.bias[squad.index]
         for i in np.flatnonzero(senses.stalled & ~self.stalled):
             x, y, _ = senses.navigation.believed[i].tolist()
@@ -303,38 +290,12 @@ class Running:
 
     def _reroute(self, senses: Senses, router: Rerouting, fresh: set[int]) -> None:
         """Have robots with lidar put on their maps what they see, and drive around what bars their way."""
-        router.begin(fresh)
         present, believed = ~self.moored & ~self.aground & ~self.lost, senses.navigation.believed
         sure = senses.navigation.sure | self.sensing.mapping
+        router.begin(fresh)
         router.look(believed, sure, senses.angles, senses.ranges, REACH, self.suffering["comms"], present)
-        actual, mode = self.fleet.gather("reached"), self.fleet.gather("tracks")["mode"]
-        done = router.reached(actual)
-        for i in senses.lidars.tolist():
-            command = self.commands.get(self.ids[i], ())
-            if done[i] >= len(command) or not present[i] or (mode[i] not in (SAIL, ROTATE) and i not in fresh):
-                continue
-            ahead = router.driven(i, command)[actual[i] :]
-            others = [self._going(j, believed[j, :2], router, actual) for j in np.flatnonzero(present).tolist() if j != i]
-            detour = router.detour(
-                i, self.time, believed[i, :2], command, int(done[i]), ahead,
-                fresh=i in fresh, stalled=bool(senses.stalled[i]), others=others,
-            )  # fmt: skip
-            if detour is not None:
-                squad, place = self.fleet.of(i)
-                squad.command(place, detour.waypoints)
-                router.detours[i] = detour
-            if detour is not None and not detour.waypoints:
-                router.stuck.add(i)
-                x, y, _ = believed[i].tolist()
-                data = {"x": x, "y": y, "found": router.obstacles(i)}
-                stop, rest = command[detour.onward], command[detour.onward :]
-                task = next((w.task for w in rest if w.task and (w.x, w.y) == (stop.x, stop.y)), "")
-                self.events.append(Event("unreachable", self.ids[i], task, data))
-
-    def _going(self, j: int, here: np.ndarray, router: Rerouting, actual: np.ndarray) -> np.ndarray:
-        """Return the (q, 2) places where a vehicle is and is going."""
-        ahead = router.driven(j, self.commands.get(self.ids[j], ()))[actual[j] :]
-        return np.array([here, *((w.x, w.y) for w in ahead)])
+        commands = [self.commands.get(id, ()) for id in self.ids]  # noqa: A001
+        self.events += router.drive_around(self.time, self.fleet, believed, commands, fresh, senses.stalled, present)
 
     def _reached(self) -> np.ndarray:
         """Return (k,) how many waypoints of its last command each has reached."""
@@ -346,7 +307,7 @@ class Running:
         start, end = self.fleet.gather("ends")[..., :2].transpose(1, 0, 2)
         tracks, pace = self.fleet.gather("tracks"), np.hypot(*self.velocity[:, :2].T)
         speed, aside = self.fleet.gather("pace"), self.fleet.gather("aside")
-        return Legs(start, end, speed, self.slow, aside, pace, self.length, tracks["leg"], tracks["mode"])
+        return Legs(start, end, speed, self.watch.slow, aside, pace, self.length, tracks["leg"], tracks["mode"])
 
     def _moor(self) -> None:
         near = np.minimum(np.hypot(*(self.position[:, :2] - self.start).T), np.hypot(*(self.position[:, :2] - self.home).T))
@@ -363,42 +324,8 @@ class Running:
             squad.active[:] = ~(self.moored | self.aground)[squad.index]
 
     def _keep_clear(self) -> None:
-        """Have vehicles give way to one another; one that has no room to go aside stays on its path.
-
-        Before what lies still on its path it stops, if it can pass on neither side.
-        """
-        slow, want, instead = (np.empty(self.count) for _ in range(3))
-        course, aside, rest = self.fleet.gather("course"), self.fleet.gather("aside"), self.fleet.gather("rest")
-        speed = np.hypot(self.velocity[:, 0], self.velocity[:, 1])
-        pace = np.where(self.fleet.gather("idle"), 0.0, self.fleet.gather("pace"))
         present = ~self.moored & ~self.aground
-        give_way(self.position, course, speed, pace, self.fleet.gather("shifted"), self.keep, present, slow, want, instead)
-        for i in map(int, np.flatnonzero((want != 0) & (want != aside))):
-            reach = course[i] * min(speed[i] * 5.0, rest[i])
-            if self._has_room(i, reach, course[i], want[i] - aside[i]):
-                continue
-            if np.isnan(instead[i]):
-                want[i] = aside[i]
-            elif self._has_room(i, reach, course[i], instead[i] - aside[i]):
-                want[i] = instead[i]
-            else:
-                want[i], slow[i] = aside[i], 0.0
-        self.wary = stop_short(
-            self.position, self.velocity, course, pace, want - aside, self.length, self.brakes, present, slow
-        )
-        free = (slow > 0.05 * pace) | ~np.any(course != 0.0, axis=1) | ~present
-        self.stood = np.where(free, self.time, self.stood)
-        stands = self.time - self.stood > WAITS + 2.0 * np.arange(self.count)
-        creep_on(self.position, self.heading, self.velocity, pace, self.hull, self.brakes, present, stands, slow)
-        self.slow = slow
-        for squad in self.fleet.squads:
-            squad.tracks["slow"], squad.tracks["want"] = slow[squad.index], want[squad.index]
-
-    def _has_room(self, i: int, ahead: np.ndarray, course: np.ndarray, starboard: float) -> bool:
-        """Return whether vehicle `i` can go `ahead`, (2,) metres, and as many further to starboard."""
-        there = self.position[i, :2] + ahead
-        side = there + starboard * np.array([course[1], -course[0]])
-        return self.room[i].contains(LineString([self.position[i, :2], there, side]))
+        self.watch.keep_clear(self.time, self.fleet, self.position, self.heading, self.velocity, present)
 
     def _serve(self, reached: np.ndarray) -> tuple[Event, ...]:
         """Return an event for each task served since the last call."""
