@@ -1,7 +1,9 @@
 """Random missions with random faults, each from one seed: small sites with holes, fleets of every domain, every planner."""
 
+import runpy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import shapely
@@ -11,15 +13,20 @@ from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.models import load_model
 from quarterdeck.geo.scenario import Area, Obstacle, Precedence, Scenario, Site, Task, Vehicle, as_multipolygon
+from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.assign import assign
 from quarterdeck.mission.cover import cover
 from quarterdeck.mission.guards import plan_guards
 from quarterdeck.mission.lines import plan_lines
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.timing import RESERVE
+from quarterdeck.mission.triage.plan import run_plan
 from quarterdeck.physics.faults import Fault
 
+_drills = runpy.run_path(str(Path(__file__).with_name("random_triage.py")))
+draw_drill, draw_hills = _drills["draw_drill"], _drills["draw_hills"]
 KINDS = ("stc", "lines", "guards", "tasks")
+WIDER = 1000  # seeds from here on draw triage drills and ranges of radios too; those before draw what they always drew
 # Track spacings and how long a site's side is in them; a vehicle of each model surveys for some minutes.
 SPACING = {"husky": 5.0, "jackal": 5.0, "otter": 16.0, "wam-v": 25.0, "survey-quad": 40.0, "crazyflie": 1.5}
 FLEETS = {"ground": ("husky", "jackal"), "surface": ("otter", "wam-v"), "aerial": ("survey-quad", "crazyflie")}
@@ -28,7 +35,9 @@ TRIES = 40  # sites drawn until one can be planned
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A mission and what befalls it. `current` m/s east and north; `delay` seconds until a silent vehicle is given up."""
+    """A mission and what befalls it. `current` m/s east and north; `delay` seconds until a silent vehicle is given up;
+    `terrain` is the ground, flat where there is none.
+    """
 
     seed: int
     kind: str
@@ -37,12 +46,15 @@ class Case:
     faults: tuple[Fault, ...]
     delay: float
     current: tuple[float, float]
+    terrain: Terrain | None = None
 
 
 def draw_case(seed: int) -> Case:
     """Return the case of a seed."""
     rng = np.random.default_rng([seed, 0x50AC])
-    kind = str(rng.choice(KINDS))
+    kind = str(rng.choice(KINDS if seed < WIDER else (*KINDS, "triage")))
+    if kind == "triage":
+        return _drill(seed, rng)
     for _ in range(TRIES):
         domain = str(rng.choice(list(FLEETS)))
         try:
@@ -54,9 +66,28 @@ def draw_case(seed: int) -> Case:
     else:
         raise RuntimeError(f"seed {seed}: no site could be planned in {TRIES} tries")
     mission = _powered(mission, rng)
+    mission = mission if seed < WIDER else _ranged(mission, rng)
     delay = float(rng.choice([0.0, 5.0, 20.0, 60.0]))
     current = tuple(rng.uniform(-0.15, 0.15, 2).tolist()) if domain == "surface" and rng.random() < 0.5 else (0.0, 0.0)
-    return Case(seed, kind, domain, mission, _faults(mission, delay, rng), delay, current)
+    span = max(r.duration for r in mission.routes)
+    return Case(seed, kind, domain, mission, _faults(mission, span, delay, rng), delay, current)
+
+
+def _drill(seed: int, rng: np.random.Generator) -> Case:
+    for _ in range(TRIES):
+        side = rng.uniform(14.0, 30.0)
+        field = _outline(side, rng)
+        try:
+            mission = draw_drill(field, _holes(field, side, 3.0, rng), rng)
+            span = run_plan(mission).end
+        except InputError:  # too narrow for the team, or a casualty lies where no way leads
+            continue
+        break
+    else:
+        raise RuntimeError(f"seed {seed}: no drill could be planned in {TRIES} tries")
+    medics = mission.parameters["medics"]
+    faults = [f for f in _faults(mission, span, 60.0, rng) if f.vehicle not in medics or f.kind in ("lost", "comms")]
+    return Case(seed, "triage", "team", mission, tuple(faults), 0.0, (0.0, 0.0), draw_hills(mission, rng))
 
 
 def _scenario(kind: str, domain: str, rng: np.random.Generator) -> Scenario:
@@ -183,12 +214,21 @@ def _powered(mission: Mission, rng: np.random.Generator) -> Mission:
     return replace(mission, vehicles=vehicles)
 
 
-def _faults(mission: Mission, delay: float, rng: np.random.Generator) -> tuple[Fault, ...]:
+def _ranged(mission: Mission, rng: np.random.Generator) -> Mission:
+    """Let a quarter of the fleets speak no further than a part of the site; guards' range is how far they see."""
+    if mission.method == "guards" or rng.random() > 0.25:
+        return mission
+    west, south, east, north = mission.site.operating.bounds
+    reach = rng.uniform(0.15, 0.7) * np.hypot(east - west, north - south)
+    return replace(mission, vehicles=tuple(replace(v, range=float(reach)) for v in mission.vehicles))
+
+
+def _faults(mission: Mission, span: float, delay: float, rng: np.random.Generator) -> tuple[Fault, ...]:
     """Return faults: up to all but one lost, at any time, often at once, while others recover or on the way home; half
-    power, no fixes, and silences, of which some are false alarms and some end only after the vehicle was given up.
+    power, no fixes, and silences, of which some are false alarms and some end only after the vehicle was given up. The
+    mission takes `span` seconds without them.
     """
     ids = [v.id for v in mission.vehicles]
-    span = max(r.duration for r in mission.routes)
     lost = rng.permutation(ids)[: int(rng.integers(0, len(ids)))]
     times = rng.uniform(0.0, 1.1 * span, len(lost))
     style = rng.random()
