@@ -19,7 +19,7 @@ demo: $(VENV)/installed  ## plan, simulate, draw and export a real site
 	$(BIN)/quarterdeck export $(OUT)/west_ant_island.plan.geojson --to qgc-wpl,geojson,png,rerun -o $(OUT)/ --force
 
 test: lint  ## everything that must hold
-	$(BIN)/python -m pytest --cov --cov-report=term:skip-covered
+	$(BIN)/python -m pytest -n logical --dist worksteal --cov --cov-report=term:skip-covered
 
 lint: $(VENV)/installed  ## style, types and layers
 	$(BIN)/ruff check .

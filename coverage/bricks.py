@@ -117,7 +117,7 @@ def _join(across: np.ndarray, along: np.ndarray, h: np.ndarray, v: np.ndarray) -
     return right, down
 
 
-@numba.njit(cache=True)
+@numba.njit  # of several signatures: no cache of its own (see .ci/signatures)
 def _price(right: np.ndarray, down: np.ndarray, r: int, c: int, vertical: int) -> int:
     """Return how many turns the link from (r, c) down (`vertical` 1) or right (0) would add."""
     up_a, down_a, left_a, right_a = _links(right, down, r, c)
@@ -136,7 +136,7 @@ def _links(right: np.ndarray, down: np.ndarray, r: int, c: int) -> tuple[int, in
     return up, 1 if down[r, c] else 0, left, 1 if right[r, c] else 0
 
 
-@numba.njit(cache=True)
+@numba.njit  # of several signatures: no cache of its own (see .ci/signatures)
 def _turns_at(up: int, down: int, left: int, right: int) -> int:
     """Return how often the walk around the tree turns at a hypervertex with these links."""
     degree = up + down + left + right

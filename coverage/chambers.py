@@ -125,7 +125,7 @@ def _crowded(distance, order, vehicle, shares, strongest, width, from_starts):  
     return crowd[:count], seeds[:count]
 
 
-@numba.njit(cache=True)
+@numba.njit  # of several signatures: no cache of its own (see .ci/signatures)
 def _find(root: np.ndarray, a: int) -> int:
     while root[a] != a:
         root[a] = root[root[a]]

@@ -97,7 +97,7 @@ def hanging(labels: np.ndarray, starts: np.ndarray, width: int):  # type: ignore
     return number, order, size, low, parent, weight
 
 
-@numba.njit(cache=True)
+@numba.njit  # of several signatures: no cache of its own (see .ci/signatures)
 def move_hanging(labels, cell, to, width, number, order, size, low, parent):  # type: ignore[no-untyped-def]
     """Give `cell` and all that hangs on it to region `to`, by the fresh results of `hanging`."""
     own = labels[cell]

@@ -106,7 +106,7 @@ def divide(
     good = [labels for labels, load in zip(tried, worst, strict=True) if load <= worst.min() + 1e-9]
 
     def time(labels: np.ndarray) -> float:
-        return _time(labels.reshape(padded.shape)[1:-1, 1:-1], shares, turn_cost)
+        return _time(np.ascontiguousarray(labels.reshape(padded.shape)[1:-1, 1:-1]), shares, turn_cost)
 
     budget = min(max(LOOKS * int(reachable.sum()), LEAST_LOOKS), MOST_LOOKS)
     straight = min((recombine(labels, cells, width, rng, budget // 8) for labels in good), key=time)

@@ -28,7 +28,7 @@ def sweep_of(wide, high, column_lanes, from_end, flip):  # type: ignore[no-untyp
     return first, across, lanes, along, length
 
 
-@numba.njit(cache=True)
+@numba.njit  # of several signatures: no cache of its own (see .ci/signatures)
 def peel(ground, start, other, size, sweep, wide, limit):  # type: ignore[no-untyped-def]
     """Return (taken, the rest, price): a strip of `size` cells around `start` that leaves a whole rest around `other`.
 
@@ -193,7 +193,7 @@ def cheapest_lanes(cells: np.ndarray, wide: int, high: int) -> float:
     return min(_lanes(cells, wide, wide, high - 2, 1, wide - 2), _lanes(cells, wide, 1, wide - 2, wide, high - 2))
 
 
-@numba.njit(cache=True)
+@numba.njit  # of several signatures: no cache of its own (see .ci/signatures)
 def _lanes(cells: np.ndarray, wide: int, across: int, lanes: int, along: int, length: int) -> float:
     """Return how many bricks the cells take along the lanes, plus a half for each that no aligned end joins to the last.
 

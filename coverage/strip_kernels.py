@@ -172,7 +172,7 @@ def candidates(vertex, before, after, points, bucket, alive, columns, walls, wal
                         turns = _turns(o, p, line[1]) + _turns(p, line[1], line[2]) + _turns(line[1], line[2], q)
                         turns += _turns(line[2], q, z) - straight - _turns(p, q, z)
                         price = max(added + turn_cost * turns, 1e-6)
-                        if cover(line, points, bucket, columns, alive, False) * PITCH**2 - bare >= least * price:
+                        if cover(line, points, bucket, columns, alive, np.bool_(False)) * PITCH**2 - bare >= least * price:
                             at.append(i)
                             bulge.append(True)
                             lines.append(line.copy())
@@ -193,7 +193,7 @@ def candidates(vertex, before, after, points, bucket, alive, columns, walls, wal
                 line[2], line[3] = p, p
                 turns = _turns(o, p, line[1]) + 1 + _turns(line[1], p, q) - straight
                 price = max(2.0 * a + turn_cost * turns, 1e-6)
-                if cover(line, points, bucket, columns, alive, False) * PITCH**2 >= least * price:
+                if cover(line, points, bucket, columns, alive, np.bool_(False)) * PITCH**2 >= least * price:
                     at.append(i)
                     bulge.append(False)
                     lines.append(line.copy())

@@ -55,7 +55,7 @@ def lay_grid(area: MultiPolygon, spacing: float, angle: float, shift: tuple[floa
     edges -= np.tile(low, 2)
     columns, rows = (high - low).astype(int)
     cells, right = inside(edges, rows, columns)
-    cells_by_column, up = inside(edges[:, [1, 0, 3, 2]], columns, rows)
+    cells_by_column, up = inside(np.ascontiguousarray(edges[:, [1, 0, 3, 2]]), columns, rows)
     cells &= cells_by_column.T
     up = up.T.copy()
     corner = _rotation(angle) @ (low * spacing + np.array(shift))

@@ -23,7 +23,7 @@ def visibility_polygons(
     that is seen is missing. A point in no triangle sees nothing: an empty polygon.
     """
     points = np.asarray(points, dtype=float).reshape(-1, 2)
-    ranges = np.broadcast_to(np.asarray(ranges, dtype=float), len(points))
+    ranges = np.full(len(points), ranges, dtype=float)
     reach = ranges / np.cos(np.pi / DISC_SIDES) if outer else ranges
     coordinates, sizes = _outlines(mesh.vertices, mesh.triangles, mesh.neighbours, points, reach)
     index = np.repeat(np.arange(len(points)), sizes)
@@ -49,7 +49,7 @@ def visible_points(
     """
     origins = np.asarray(origins, dtype=float).reshape(-1, 2)
     points = np.asarray(points, dtype=float).reshape(-1, 2)
-    ranges = np.ascontiguousarray(np.broadcast_to(np.asarray(ranges, dtype=float), len(origins)))
+    ranges = np.full(len(origins), ranges, dtype=float)
     home = _locate_all(mesh.vertices, mesh.triangles, points)
     order = np.argsort(home, kind="stable")
     first = np.searchsorted(home[order], np.arange(len(mesh.triangles) + 1))

@@ -1,6 +1,7 @@
 """Options of the test run, and logs of our own making."""
 
 import csv
+import signal
 import struct
 from datetime import UTC, datetime
 from types import SimpleNamespace
@@ -26,6 +27,14 @@ def soak_cases(request):
 def soak_from(request):
     """Return the seed of the first damaged input."""
     return request.config.getoption("--soak-from")
+
+
+@pytest.fixture
+def hears_ctrl_c():
+    """Have Ctrl-C heard here and by what is started: what a shell runs in the background ignores it, as do its children."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture

@@ -32,6 +32,7 @@ def test_a_limit_that_is_not_reached_cuts_nothing():
     assert limit.cut == []
 
 
+@pytest.mark.usefixtures("hears_ctrl_c")
 def test_the_first_interrupt_ends_searches_and_the_second_everything():
     """A real SIGINT is noted, the next one raises; then Python's own handler stands again."""
     with limited(interruptible=True) as limit:

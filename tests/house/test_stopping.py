@@ -12,6 +12,7 @@ import pytest
 from quarterdeck.cli import main
 from quarterdeck.mission.planfile import read_plan
 
+pytestmark = pytest.mark.usefixtures("hears_ctrl_c")
 DATA = Path(__file__).parents[2] / "data"
 STOPPED = """
 import os, signal, sys
@@ -40,14 +41,6 @@ def status(*arguments):
     with pytest.raises(SystemExit) as stop:
         main([str(a) for a in arguments])
     return stop.value.code
-
-
-@pytest.fixture(autouse=True)
-def heard():
-    """Have Ctrl-C heard by what is started here: what a shell runs in the background ignores it, and so do its children."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(scope="module")
