@@ -37,7 +37,7 @@ def judge(case: Any, run: Run, watched: Any) -> list[str]:
     idle = _lost(case, run) | _silent(case)
     last = watched.plans[-1][1] if watched.plans else mission
     wrong = [*_hurt(case, run), *_returns(case, run, watched)]
-    wrong += [str(line) for line in watched.undone if "no new plan" in str(line)]
+    wrong += [str(r) for r in watched.undone if r.kind == "plan"]
     if idle != {v.id for v in mission.vehicles}:
         wrong += _undone(case, run, watched, last)
         wrong += _needlessly_left(mission, run, watched, last, idle)
@@ -74,7 +74,7 @@ def _returns(case: Any, run: Run, watched: Any) -> list[str]:
         v.id: v.home
         for _, plan in watched.plans
         for v in plan.vehicles
-        if any(f"{v.id}: its end is in" in str(line) for line in plan.reasons)
+        if any((r.kind, r.about) == ("end", v.id) for r in plan.reasons)
     }
     for i, (v, vehicle) in enumerate(zip(run.report.vehicles, case.mission.vehicles, strict=True)):
         if v.id in lost:

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from quarterdeck.mission.mission import Mission
+from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.recovery import recovering, undone
 from quarterdeck.mission.triage.plan import METHOD
 from quarterdeck.physics.simulate import Run, simulate
@@ -32,7 +33,7 @@ class Watched:
     served: Counter[str] = field(default_factory=Counter)
     order: list[str] = field(default_factory=list)
     plans: list[tuple[float, Mission]] = field(default_factory=list)
-    undone: tuple[str, ...] = ()
+    undone: tuple[Reason, ...] = ()
     fast: list[Mission] = field(default_factory=list)
     ends: dict[str, tuple[float, float]] = field(default_factory=dict)  # of the last commands that were heard
 

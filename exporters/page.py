@@ -33,7 +33,7 @@ def page(mission: Mission) -> str:
         "ways": [_way(route) for route in mission.routes],
         "end": max((route.duration for route in mission.routes), default=0.0),
     }
-    state = "feasible" if mission.feasible else "INFEASIBLE: " + "; ".join(mission.reasons)
+    state = "feasible" if mission.feasible else "INFEASIBLE: " + "; ".join(map(str, mission.reasons))
     spacing = "" if mission.spacing is None else f", {spacing_words(mission)}"
     routes = [(i, route, colour) for i, (route, colour) in enumerate(zip(mission.routes, palette, strict=True))]
     parts = {

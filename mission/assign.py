@@ -18,6 +18,7 @@ from quarterdeck.geo.scenario import Scenario, Task, Vehicle
 from quarterdeck.geo.version import VERSION
 from quarterdeck.mission.itinerary import Visit, itineraries
 from quarterdeck.mission.mission import Mission, Route
+from quarterdeck.mission.reason import ImpossibleError, Reason
 from quarterdeck.mission.timing import RESERVE, shortfalls
 from quarterdeck.mission.tours.paper import paper_search
 from quarterdeck.mission.tours.problem import SHAPES, Problem, problem
@@ -119,17 +120,21 @@ def _check(scenario: Scenario, weights: Sequence[float], shape: str) -> None:
     for task in tasks:
         unknown = [a.task for a in task.after if a.task not in ids]
         if unknown:
-            raise InputError(f"task {task.id!r}: after names the unknown task {unknown[0]!r}")
+            raise _impossible(task, f"after names the unknown task {unknown[0]!r}")
         if task.priority not in (0, 1, 2, 3):
-            raise InputError(f"task {task.id!r}: priority {task.priority!r} must be 0, 1, 2 or 3")
+            raise _impossible(task, f"priority {task.priority!r} must be 0, 1, 2 or 3")
         if not task.service_time >= 0:
-            raise InputError(f"task {task.id!r}: service_time {task.service_time:g} s must not be negative")
+            raise _impossible(task, f"service_time {task.service_time:g} s must not be negative")
         able = [v for v in vehicles if _may(v, task)]
         if not able:
-            raise InputError(f"task {task.id!r}: {_unable(task)}; no vehicle is and can")
+            raise _impossible(task, f"{_unable(task)}; no vehicle is and can")
         blocks = [o for o in scenario.site.obstacles if o.polygon.contains(Point(task.position))]
         if blocks and all(any(v.domain in o.blocks for o in blocks) for v in able):
-            raise InputError(f"task {task.id!r}: is inside obstacle {blocks[0].id!r}; move it out")
+            raise _impossible(task, f"is inside obstacle {blocks[0].id!r}; move it out")
+
+
+def _impossible(task: Task, why: str) -> ImpossibleError:
+    return ImpossibleError(Reason(why, "task", task.id))
 
 
 def _may(vehicle: Vehicle, task: Task) -> bool:
@@ -158,10 +163,11 @@ def _problem(
     for i, task in enumerate(tasks):
         if not (reach & may)[:, i].any():
             who = " or ".join(v.id for v, ok in zip(vehicles, may[:, i], strict=True) if ok)
-            raise InputError(f"task {task.id!r}: there is no way for {who} to it and home, with its clearance; move it")
+            raise _impossible(task, f"there is no way for {who} to it and home, with its clearance; move it")
     for r, v in enumerate(vehicles):
         if not np.isfinite(ways.idle[r]):
-            raise InputError(f"vehicle {v.id!r}: there is no way from its start to its end, with its clearance; move one")
+            why = "there is no way from its start to its end, with its clearance; move one"
+            raise ImpossibleError(Reason(why, "vehicle", v.id))
     service = np.array([t.service_time for t in tasks])
     limit = usable(vehicles, RESERVE)
     _check_endurance(scenario, ways, reach & may, service, limit)
@@ -186,8 +192,12 @@ def _problem(
         names=[repr(t.id) for t in tasks],
     )
     for i in np.flatnonzero(~p.can.any(axis=0)).tolist():
-        ring = ", ".join(repr(tasks[j].id) for j in np.flatnonzero(p.group == p.group[i]))
-        raise InputError(f"tasks {ring} must be done by one robot, and no vehicle can reach and do all of them")
+        ring = [tasks[j] for j in np.flatnonzero(p.group == p.group[i])]
+        last = next(t for t in ring if not any(a.task == t.id for other in ring for a in other.after))
+        others = ", ".join(repr(t.id) for t in ring if t is not last)
+        raise _impossible(
+            last, f"must be done by the robot that does {others}, and no vehicle can reach and do all of them"
+        )
     return p
 
 
@@ -198,9 +208,10 @@ def _check_endurance(scenario: Scenario, ways: Travel, able: np.ndarray, service
     for i, task in enumerate(scenario.tasks):
         best = int(np.argmin(short[:, i]))
         if short[best, i] > 0:
-            raise InputError(
-                f"task {task.id!r}: takes {need[best, i]:,.0f} s there and back, and no vehicle can be out so long "
-                f"(best {scenario.vehicles[best].id}: {limit[best]:,.0f} s after {RESERVE:.0%} reserve)"
+            raise _impossible(
+                task,
+                f"takes {need[best, i]:,.0f} s there and back, and no vehicle can be out so long "
+                f"(best {scenario.vehicles[best].id}: {limit[best]:,.0f} s after {RESERVE:.0%} reserve)",
             )
 
 
@@ -227,10 +238,12 @@ def _figures(
     }
 
 
-def _late(tasks: Sequence[Task], visits: Sequence[Visit]) -> list[str]:
+def _late(tasks: Sequence[Task], visits: Sequence[Visit]) -> list[Reason]:
     closes = {t.id: t.window[1] for t in tasks}
     return [
-        f"task {v.task!r}: {v.vehicle} begins at {v.start:,.0f} s, {v.start - closes[v.task]:,.0f} s after its window"
+        Reason(
+            f"{v.vehicle} begins at {v.start:,.0f} s, {v.start - closes[v.task]:,.0f} s after its window", "late", v.task
+        )
         for v in visits
         if v.start > closes[v.task] + 1e-6
     ]

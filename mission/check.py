@@ -31,7 +31,7 @@ def check_mission(mission: Mission) -> tuple[str, ...]:
     if broken:
         return broken
     problems = [
-        *mission.reasons,
+        *map(str, mission.reasons),
         *trespasses(mission),
         *_strange(mission),
         *_too_near(mission),
@@ -39,7 +39,7 @@ def check_mission(mission: Mission) -> tuple[str, ...]:
         *_meetings(mission),
     ]
     for route in mission.routes:
-        problems += shortfalls(mission.vehicle(route.vehicle), route)
+        problems += map(str, shortfalls(mission.vehicle(route.vehicle), route))
     problems += [*too_high(mission), *too_steep(mission)]
     if mission.method == "guards":
         from quarterdeck.mission.guard_check import unproved  # numba and more, which exports need not wait for

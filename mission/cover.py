@@ -26,6 +26,7 @@ from quarterdeck.geo.scenario import Scenario, Vehicle, as_multipolygon
 from quarterdeck.geo.transit import Roadmap, roadmap, shortest_paths
 from quarterdeck.geo.version import VERSION
 from quarterdeck.mission.mission import Layer, Mission, Route, unbroken
+from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.routes import survey_routes, survey_tracks
 from quarterdeck.mission.timing import seconds_out
 
@@ -129,7 +130,7 @@ class _Attempt:
     regions: list["Region"]
     tracks: list[list[np.ndarray]]
     routes: tuple[Route, ...]
-    reasons: list[str]
+    reasons: list[Reason]
     notes: list[str]
 
     @property

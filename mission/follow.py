@@ -15,6 +15,7 @@ from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.heights import above_ceilings, levels
 from quarterdeck.mission.mission import Mission, Route, Waypoint
+from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.timing import shortfalls
 
 TOLERANCE = 5.0  # m
@@ -43,7 +44,7 @@ def follow(mission: Mission, terrain: Terrain, *, tolerance: float = TOLERANCE) 
         above, sea = _flown(made, terrain)
         before = shortfalls(vehicle, route)
         reasons = [r for r in reasons if r not in before]
-        reasons += shortfalls(vehicle, made) + above_ceilings(vehicle, above, sea)
+        reasons += [*shortfalls(vehicle, made), *map(Reason, above_ceilings(vehicle, above, sea))]
         notes += _slowed(vehicle, route, made) + _homeward(vehicle, made, terrain)
         seen.append(
             _Seen(float(above.min()), float(above.max()), float(sea.max()), _pictures(mission, vehicle, made, terrain))
@@ -56,7 +57,8 @@ def follow(mission: Mission, terrain: Terrain, *, tolerance: float = TOLERANCE) 
     figures |= {"makespan": max(r.duration for r in routes)} if "makespan" in figures else {}
     figures |= {"energy": sum(r.energy for r in routes)} if "energy" in figures else {}
     if figures.get("least_side_overlap", 1.0) <= 0:
-        reasons.append("over the highest ground pictures of neighbouring lines do not meet; fly higher or closer lines")
+        why = "over the highest ground pictures of neighbouring lines do not meet; fly higher or closer lines"
+        reasons.append(Reason(why))
     parameters = dict(mission.parameters) | {"terrain": terrain.name, "tolerance": tolerance}
     return replace(
         mission, routes=tuple(routes), reasons=tuple(dict.fromkeys(reasons)), figures=figures, parameters=parameters

@@ -19,6 +19,7 @@ from quarterdeck.geo.visibility import visibility_polygons
 from quarterdeck.mission.guard_routes import Team, Tours, guard_route, shorter_tours
 from quarterdeck.mission.guards import enter, guard_ranks, guards_mission, vehicle_ranges
 from quarterdeck.mission.mission import Layer, Mission
+from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.timing import shortfalls
 
 EFFORT = 0.1  # of the search for a whole plan: robots are waiting
@@ -56,13 +57,13 @@ def guards_from_now(
     tours = _affordable(space, short, team, ranks)
     after = guards_mission(scenario, space, mesh, tours, team, ())
     lost = after.figures["certificate"]["uncovered"]
-    reasons = [f"{lost:.6g} m2 can no longer be seen" + _why(hidden.area, lonely.area, lost)] if lost > 0 else []
+    told = f"{lost:.6g} m2 can no longer be seen" + _why(hidden.area, lonely.area, lost)
     return replace(
         after,
         parameters=mission.parameters,
         seed=seed,
         layers=(_with_seen(after.layers[0], seen), *after.layers[1:]),
-        reasons=(*reasons, *after.reasons),
+        reasons=(*([Reason(told)] if lost > 0 else []), *after.reasons),
     )
 
 

@@ -19,6 +19,7 @@ from quarterdeck.geo.triangulation import Triangulation, triangulate
 from quarterdeck.geo.visibility import visibility_polygons
 from quarterdeck.mission.guard_routes import Team, Tours, guard_layers, guard_route, paper_tours, shorter_tours
 from quarterdeck.mission.mission import Mission, undone_layer
+from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.timing import shortfalls
 
 Mode = Literal["optimised", "paper"]
@@ -59,7 +60,7 @@ def plan_guards(
     seeable = space if unseen.is_empty else replace(space, target=as_multipolygon(space.target.difference(unseen)))
     paper = paper_tours(space, guards, team)
     tours = paper if mode == "paper" else _optimised(scenario, seeable, mesh, paper, team, seed)
-    reasons = [] if unseen.is_empty else [f"{unseen.area:.6g} m2 cannot be seen from where the vehicles may be"]
+    reasons = [] if unseen.is_empty else [Reason(f"{unseen.area:.6g} m2 cannot be seen from where the vehicles may be")]
     mission = guards_mission(scenario, space, mesh, tours, team, reasons)
     compared = {"guards": len(paper.guards), "makespan": paper.makespan, "bound": paper.bound}
     return replace(
@@ -72,7 +73,7 @@ def plan_guards(
 
 
 def guards_mission(
-    scenario: Scenario, space: Space, mesh: Triangulation, tours: Tours, team: Team, reasons: Sequence[str]
+    scenario: Scenario, space: Space, mesh: Triangulation, tours: Tours, team: Team, reasons: Sequence[Reason]
 ) -> Mission:
     """Return the mission that follows tours, with its figures and its certificate."""
     routes = tuple(guard_route(v, tours, i) for i, v in enumerate(team.vehicles))

@@ -17,6 +17,7 @@ from quarterdeck.geo.transit import Roadmap, shortest_paths
 from quarterdeck.geo.version import VERSION
 from quarterdeck.mission.cover import covering, divided, roadmaps, trackable
 from quarterdeck.mission.mission import Layer, Leg, Mission, Route
+from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.routes import way_routes
 from quarterdeck.mission.seafloor import seen, spreads
 
@@ -124,7 +125,7 @@ class _Attempt:
     laid: list[Lines]
     notes: list[str]
     routes: tuple[Route, ...]
-    reasons: list[str]
+    reasons: list[Reason]
 
     @property
     def makespan(self) -> tuple[int, float]:
@@ -134,12 +135,12 @@ class _Attempt:
 
 def _routes(
     vehicles: Sequence[Vehicle], laid: Sequence[Lines], roads: Sequence[Roadmap]
-) -> tuple[tuple[Route, ...], list[str]]:
+) -> tuple[tuple[Route, ...], list[Reason]]:
     ways = [_way(v, lines, road) for v, lines, road in zip(vehicles, laid, roads, strict=True)]
     routes, reasons = way_routes(vehicles, [(points, legs) for points, legs, _ in ways], roads)
-    missing = [reason for _, _, found in ways for reason in found]
+    missing = [Reason(line) for _, _, found in ways for line in found]
     missing += [
-        f"{v.id}: no way to {lines.unreached} pieces of its lines"
+        Reason(f"{v.id}: no way to {lines.unreached} pieces of its lines")
         for v, lines in zip(vehicles, laid, strict=True)
         if lines.unreached
     ]

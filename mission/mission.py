@@ -8,6 +8,7 @@ import numpy as np
 
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.scenario import Casualty, Site, Task, Vehicle
+from quarterdeck.mission.reason import Reason
 
 Leg = Literal["start", "transit", "survey", "turn", "takeoff", "landing"]
 
@@ -110,7 +111,7 @@ class Mission:
     casualties: tuple[Casualty, ...] = ()
     figures: Mapping[str, Any] = field(default_factory=dict)
     bounds: Mapping[str, Any] = field(default_factory=dict)
-    reasons: tuple[str, ...] = ()
+    reasons: tuple[Reason, ...] = ()
     layers: tuple[Layer, ...] = ()
     input_hash: str = ""
     version: str = ""

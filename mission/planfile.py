@@ -26,6 +26,7 @@ from quarterdeck.geo.reader import MAX_RADIUS
 from quarterdeck.geo.scenario import Area, Casualty, Obstacle, Precedence, Sensor, Site, Task, Vehicle, as_multipolygon
 from quarterdeck.geo.typed import fits, wrong_field
 from quarterdeck.mission.mission import Layer, Leg, Mission, Route, Waypoint
+from quarterdeck.mission.reason import HEADS, Reason, reason_of
 
 FORMAT = 1
 DAMAGE = (KeyError, TypeError, ValueError, ArithmeticError, IndexError, AttributeError, ShapelyError)
@@ -54,7 +55,8 @@ def _header(mission: Mission) -> dict[str, Any]:
         version=mission.version,
         method=mission.method,
         feasible=mission.feasible,
-        reasons=list(mission.reasons),
+        reasons=[str(r) for r in mission.reasons],
+        reason_kinds=[[r.kind, r.about] for r in mission.reasons],
         seed=mission.seed,
         spacing=mission.spacing,
         origin=[mission.frame.lon, mission.frame.lat],
@@ -228,7 +230,7 @@ def _mission(name: str, header: dict[str, Any], features: list[dict[str, Any]]) 
         casualties=tuple(Casualty(f["id"], _xy(f, frame), f["properties"]["colour"]) for f in of("casualty")),
         figures=header["figures"],
         bounds=header["bounds"],
-        reasons=tuple(header["reasons"]),
+        reasons=_reasons(header),
         layers=tuple(Layer(n, tuple(g for g, _ in items), tuple(p for _, p in items)) for n, items in layers.items()),
         input_hash=header["input_hash"],
         version=header["version"],
@@ -236,6 +238,16 @@ def _mission(name: str, header: dict[str, Any], features: list[dict[str, Any]]) 
     )
     _check_types(mission)
     return mission
+
+
+def _reasons(header: dict[str, Any]) -> tuple[Reason, ...]:
+    """Return why the plan is infeasible; plans of before there were kinds of reasons have none of a kind."""
+    lines = header["reasons"]
+    kinds = header.get("reason_kinds", [["", ""]] * len(lines))
+    for line, (kind, about) in zip(lines, kinds, strict=True):
+        if kind not in HEADS or not fits((line, about), tuple[str, str]):
+            raise TypeError("its reasons are not what they must be")
+    return tuple(reason_of(line, kind, about) for line, (kind, about) in zip(lines, kinds, strict=True))
 
 
 def _check_types(mission: Mission) -> None:

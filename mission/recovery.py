@@ -24,6 +24,7 @@ from quarterdeck.mission.inspection import Memory as Inspected
 from quarterdeck.mission.inspection import default_director
 from quarterdeck.mission.mission import Mission, Route
 from quarterdeck.mission.progress import Progress, surveyed
+from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.replan import replan
 from quarterdeck.mission.triage.plan import METHOD
 
@@ -55,7 +56,7 @@ class _Memory:
     given_up: frozenset[str] = frozenset()
     wake: float = inf
     barred: frozenset[tuple[str, str]] = frozenset()
-    undone: tuple[str, ...] = ()
+    undone: tuple[Reason, ...] = ()
 
 
 def recovering(mission: Mission, *, delay: float = 0.0, tell: Tell | None = None) -> Director:
@@ -148,11 +149,11 @@ def _replanned(
     try:
         after = replan(now.mission, progress, changes)
     except InputError as error:
-        return replace(now, undone=(*now.undone, f"no new plan at {time:.0f} s: {error}"))
+        return replace(now, undone=(*now.undone, Reason(f"no new plan at {time:.0f} s: {error}", "plan")))
     if tell:
         tell(time, after)
     told = {r.vehicle: r for r in after.routes if states[r.vehicle].alive}
-    left = (*now.undone, *undone(now.inner), *(r for r in after.reasons if r.startswith("task ")))
+    left = (*now.undone, *undone(now.inner), *(r for r in after.reasons if r.kind == "undone"))
     return replace(
         now,
         mission=after,
@@ -167,15 +168,15 @@ def _replanned(
     )
 
 
-def undone(memory: Any) -> tuple[str, ...]:
-    """Return, one line each, what a director's `memory` says will not be done, and why."""
+def undone(memory: Any) -> tuple[Reason, ...]:
+    """Return what a director's `memory` says will not be done, and why."""
     if isinstance(memory, Contact):
         return undone(memory.inner)
     if isinstance(memory, _Memory):
         return tuple(dict.fromkeys((*memory.undone, *undone(memory.inner))))
     if isinstance(memory, Inspected):
-        told = [f"task {task!r}: {why}" for task, why in memory.abandoned.items()]
-        return (*told, *(f"{vehicle}: found no way home" for vehicle in sorted(memory.stranded)))
+        told = [Reason(why, "undone", task) for task, why in memory.abandoned.items()]
+        return (*told, *(Reason("found no way home", "end", vehicle) for vehicle in sorted(memory.stranded)))
     return ()
 
 

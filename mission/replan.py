@@ -12,6 +12,7 @@ from quarterdeck.mission.changes import changed_site, check_changes
 from quarterdeck.mission.guard_recovery import guards_from_now, with_confirmed
 from quarterdeck.mission.mission import Layer, Mission, Route, Waypoint
 from quarterdeck.mission.progress import Progress, energy_left, with_surveyed
+from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.recorded import as_planned
 from quarterdeck.mission.survey_recovery import survey_from_now
 from quarterdeck.mission.task_recovery import assign_from_now, tasks_left
@@ -88,7 +89,7 @@ def _moved(vehicle: Vehicle, progress: Progress) -> Vehicle:
     return replace(vehicle, start=(x, y), end=vehicle.home, battery=left, endurance=endurance, heading=heading)
 
 
-def _homes(site: Site, vehicles: tuple[Vehicle, ...]) -> tuple[tuple[Vehicle, ...], list[str]]:
+def _homes(site: Site, vehicles: tuple[Vehicle, ...]) -> tuple[tuple[Vehicle, ...], list[Reason]]:
     """Return the vehicles, each with a home that it can stand at, and why that is not the one that it had.
 
     Raises InputError if a vehicle stands inside an obstacle.
@@ -106,7 +107,8 @@ def _homes(site: Site, vehicles: tuple[Vehicle, ...]) -> tuple[tuple[Vehicle, ..
             free = site.navigable(vehicle.domain, vehicle.clearance)
             near = nearest_points(free, Point(vehicle.home))[0] if free.area else Point(vehicle.start)
             away = near.distance(Point(vehicle.home))
-            reasons.append(f"{vehicle.id}: its end is inside obstacle {taken!r}; it stops {away:.0f} m before it")
+            why = f"its end is inside obstacle {taken!r}; it stops {away:.0f} m before it"
+            reasons.append(Reason(why, "end", vehicle.id))
             settled.append(replace(vehicle, end=(near.x, near.y)))
         else:
             settled.append(vehicle)
@@ -136,7 +138,7 @@ def _rest(mission: Mission, progress: Progress) -> Mission:
         layers=_with_surveyed_layer(mission, progress),
         tasks=tasks_left(mission, mission.tasks, progress, {v.id for v in vehicles}) if mission.tasks else (),
         figures=dict(mission.figures) | left,
-        reasons=(*(r for r in mission.reasons if "short by" not in r), *reasons),
+        reasons=(*(r for r in mission.reasons if r.kind != "energy"), *reasons),
     )
 
 

@@ -11,6 +11,7 @@ from quarterdeck.geo.scenario import Vehicle, as_multipolygon
 from quarterdeck.geo.transit import Roadmap, shortest_paths, straight
 from quarterdeck.mission.corners import driven, entered, with_turns
 from quarterdeck.mission.mission import Leg, Route, unbroken
+from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.timing import shortfalls, timed_route
 
 PIVOT = np.pi  # radians: a turn on the spot, at the most
@@ -19,7 +20,7 @@ LAYER_STEP = 5.0  # m between the altitudes at which aerial vehicles transit, le
 
 def survey_routes(
     vehicles: Sequence[Vehicle], tracks: Sequence[Sequence[np.ndarray]], roads: Sequence[Roadmap]
-) -> tuple[tuple[Route, ...], list[str]]:
+) -> tuple[tuple[Route, ...], list[Reason]]:
     """Return each vehicle's route out, round its closed (n, 2) tracks, nearest first, and home; and why some fail."""
     return line_routes(vehicles, [_in_order(v, own) for v, own in zip(vehicles, tracks, strict=True)], roads)
 
@@ -49,7 +50,7 @@ def _straightened(line: np.ndarray) -> np.ndarray:
 
 def line_routes(
     vehicles: Sequence[Vehicle], lines: Sequence[Sequence[np.ndarray]], roads: Sequence[Roadmap]
-) -> tuple[tuple[Route, ...], list[str]]:
+) -> tuple[tuple[Route, ...], list[Reason]]:
     """Return each vehicle's route along its (n, 2) survey lines in their order, and home; and why some cannot be done."""
     ways = [_linked(vehicle, own, road) for vehicle, own, road in zip(vehicles, lines, roads, strict=True)]
     routes, reasons = way_routes(vehicles, [(points, legs) for points, legs, _ in ways], roads)
@@ -58,7 +59,7 @@ def line_routes(
 
 def way_routes(
     vehicles: Sequence[Vehicle], ways: Sequence[tuple[np.ndarray, Sequence[Leg]]], roads: Sequence[Roadmap]
-) -> tuple[tuple[Route, ...], list[str]]:
+) -> tuple[tuple[Route, ...], list[Reason]]:
     """Return each vehicle's route along its way, (n, 2) metres and the kind of each leg, and why some cannot be done.
 
     Corners become drivable (where nothing else has room, by a stop and a turn on the spot), aerial vehicles climb and land,
@@ -84,9 +85,9 @@ def way_routes(
     return tuple(routes), reasons
 
 
-def _linked(vehicle: Vehicle, lines: Sequence[np.ndarray], road: Roadmap) -> tuple[np.ndarray, list[Leg], list[str]]:
+def _linked(vehicle: Vehicle, lines: Sequence[np.ndarray], road: Roadmap) -> tuple[np.ndarray, list[Leg], list[Reason]]:
     """Return (n, 2) metres from the start along survey lines (m, 2) in order and home, the kind of each leg, what fails."""
-    points, legs, missing = [np.array([vehicle.start])], ["start"], []  # type: list[np.ndarray], list[Leg], list[str]
+    points, legs, missing = [np.array([vehicle.start])], ["start"], []  # type: list[np.ndarray], list[Leg], list[Reason]
     ends = [np.array(vehicle.start), *(line[-1] for line in lines)]
     clear = straight(road, np.array(ends[:-1]), np.array([line[0] for line in lines])) if lines else np.empty(0)
     for line, end, seen in zip(lines, ends, clear.tolist(), strict=False):
@@ -94,7 +95,9 @@ def _linked(vehicle: Vehicle, lines: Sequence[np.ndarray], road: Roadmap) -> tup
         direct = seen and (here == end).all()
         way = np.array([here, line[0]]) if direct else shortest_paths(road, here, line[0])[1][0][0]
         if way is None:
-            missing.append(f"{vehicle.id}: no way from its start to its region; move the start, or lessen its clearance")
+            missing.append(
+                Reason(f"{vehicle.id}: no way from its start to its region; move the start, or lessen its clearance")
+            )
             continue
         points += [way[1:], line[1:]]
         legs.extend(["transit"] * (len(way) - 1))
@@ -103,7 +106,7 @@ def _linked(vehicle: Vehicle, lines: Sequence[np.ndarray], road: Roadmap) -> tup
         return np.concatenate(points), legs, missing
     way = shortest_paths(road, points[-1][-1], np.array(vehicle.home))[1][0][0]
     if way is None:
-        missing.append(f"{vehicle.id}: no way from its region to its end; move the end, or lessen its clearance")
+        missing.append(Reason(f"{vehicle.id}: no way from its region to its end; move the end, or lessen its clearance"))
     elif len(points) > 1 or vehicle.home != vehicle.start:
         points.append(way[1:])
         legs.extend(["transit"] * (len(way) - 1))

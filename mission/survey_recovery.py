@@ -17,6 +17,7 @@ from quarterdeck.mission.cover import cover, roadmaps, trackable
 from quarterdeck.mission.lines import plan_lines
 from quarterdeck.mission.mission import Layer, Mission, Route, unbroken, undone_layer
 from quarterdeck.mission.progress import Progress, with_surveyed
+from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.remaining import clipped, remaining_parts
 from quarterdeck.mission.routes import line_routes, survey_tracks
 from quarterdeck.mission.sharing import Line, Shares, Team, line_of, share_out, team_of, times
@@ -49,7 +50,7 @@ def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, ch
     site = scenario.site.coverable
     gaps = as_multipolygon(_swath(left, spacing).intersection(site).difference(driven))
     rim = as_multipolygon(_swath(cut, spacing).intersection(site).difference(driven).difference(gaps))
-    told = [f"{gaps.area:.6g} m2 can no longer be covered: {_why(survey.left)}"] if left else []
+    told = [Reason(f"{gaps.area:.6g} m2 can no longer be covered: {_why(survey.left)}")] if left else []
     return replace(
         mission,
         site=scenario.site,
@@ -190,7 +191,7 @@ class _Survey:
     """Routes along lines, why some cannot be done, and the lines left out."""
 
     routes: tuple[Route, ...]
-    reasons: tuple[str, ...]
+    reasons: tuple[Reason, ...]
     left: list[Line]
 
     @property

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Scenario, Task, Vehicle
 from quarterdeck.mission.assign import assign
 from quarterdeck.mission.cover import roadmaps
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.progress import Progress
+from quarterdeck.mission.reason import ImpossibleError, Reason
 from quarterdeck.mission.routes import line_routes
 from quarterdeck.mission.timing import seconds_out, shortfalls
 
@@ -30,7 +30,7 @@ def assign_from_now(mission: Mission, scenario: Scenario, progress: Progress, *,
     """
     vehicles = tuple(replace(v, can=v.can | {_itself(v.id)}) for v in scenario.vehicles)
     tasks = tasks_left(mission, scenario.tasks, progress, {v.id for v in scenario.vehicles})
-    left, reasons, undone = list(tasks), list[str](), list[str]()
+    left, reasons, undone = list(tasks), list[Reason](), list[str]()
     while left:
         given: dict[str, Any] = {
             "first": _rows(mission, vehicles, left),
@@ -38,24 +38,21 @@ def assign_from_now(mission: Mission, scenario: Scenario, progress: Progress, *,
             "iterations": GENERATIONS,
             "seed": seed,
         }
-        dropped: dict[str, str] = {}
         try:
             after = assign(replace(scenario, vehicles=vehicles, tasks=tuple(left)), **given, **_habits(mission.parameters))
             dropped = dict.fromkeys(_too_much(after), "the energy left does not suffice")
-        except InputError as error:
-            shut = next((v for v in vehicles if str(error).startswith(f"vehicle {v.id!r}: there is no way")), None)
-            if shut is not None and shut.end != shut.start:
-                reasons.append(str(error))
-                vehicles = tuple(replace(v, end=v.start) if v is shut else v for v in vehicles)
+        except ImpossibleError as error:
+            reason = error.reason
+            if reason.kind == "vehicle":
+                reasons.append(reason)
+                vehicles = tuple(replace(v, end=v.start) if v.id == reason.about else v for v in vehicles)
                 continue
-            dropped = {t.id: str(error).split(": ", 1)[1] for t in left if str(error).startswith(f"task {t.id!r}:")}
-            if not dropped:
-                raise
+            dropped = {reason.about: reason.why}
         if dropped:
             for task, why in dropped.items():
                 gone = _with_successors(task, left) & {t.id for t in left}
-                reasons += [f"task {task!r} can no longer be done: {why}"] if task in gone else []
-                reasons += [f"task {i!r} can no longer be done: it comes after {task!r}" for i in sorted(gone - {task})]
+                reasons += [Reason(why, "undone", task)] if task in gone else []
+                reasons += [Reason(f"it comes after {task!r}", "undone", i) for i in sorted(gone - {task})]
                 undone += [t.id for t in left if t.id in gone]
                 left = [t for t in left if t.id not in gone]
             continue

@@ -7,6 +7,7 @@ import numpy as np
 
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.mission import Leg, Route, Waypoint
+from quarterdeck.mission.reason import Reason
 
 RESERVE = 0.2  # of battery and endurance, kept for wind, current and age
 
@@ -81,18 +82,20 @@ def seconds_out(vehicle: Vehicle) -> float:
     return (1 - RESERVE) * min(vehicle.endurance, by_battery)
 
 
-def shortfalls(vehicle: Vehicle, route: Route) -> list[str]:
-    """Return why the vehicle cannot do the route, one line each; none if it can, with `RESERVE` in hand."""
+def shortfalls(vehicle: Vehicle, route: Route) -> list[Reason]:
+    """Return why the vehicle cannot do the route; none if it can, with `RESERVE` in hand."""
     found = []
     battery, endurance = vehicle.battery * (1 - RESERVE), vehicle.endurance * (1 - RESERVE)
     if route.energy > battery:
-        found.append(
-            f"{vehicle.id}: needs {route.energy:.0f} Wh and has {battery:.0f} Wh "
+        why = (
+            f"needs {route.energy:.0f} Wh and has {battery:.0f} Wh "
             f"({vehicle.battery:.0f} Wh less {RESERVE:.0%} reserve), short by {route.energy - battery:.0f} Wh"
         )
+        found.append(Reason(why, "energy", vehicle.id))
     if route.duration > endurance:
-        found.append(
-            f"{vehicle.id}: needs {route.duration:.0f} s and has {endurance:.0f} s "
+        why = (
+            f"needs {route.duration:.0f} s and has {endurance:.0f} s "
             f"({vehicle.endurance:.0f} s less {RESERVE:.0%} reserve), short by {route.duration - endurance:.0f} s"
         )
+        found.append(Reason(why, "energy", vehicle.id))
     return found

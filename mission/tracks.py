@@ -13,6 +13,7 @@ from quarterdeck.geo.logs import Log, read_logs
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.cleaning import cleaned
 from quarterdeck.mission.mission import Mission, Route
+from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.track import Track, set_off, since, until_home
 
 LATE, ANOTHER_DAY = 60.0, 43_200.0  # s after the plan: told, and taken for another mission
@@ -27,7 +28,7 @@ class Record:
 
     tracks: tuple[Track, ...]
     notes: tuple[str, ...]
-    reasons: tuple[str, ...]
+    reasons: tuple[Reason, ...]
     start: float | None = None
 
 
@@ -79,7 +80,7 @@ def record(mission: Mission, files: Sequence[Sequence[tuple[str, Log]]], *, star
     Raises InputError if a vehicle has two logs on different clocks.
     """
     notes: list[str] = []
-    reasons: list[str] = []
+    reasons: list[Reason] = []
     logs: dict[str, list[Log]] = {}
     for name, log in (pair for file in files for pair in file):
         logs.setdefault(name, []).append(log)
@@ -88,15 +89,15 @@ def record(mission: Mission, files: Sequence[Sequence[tuple[str, Log]]], *, star
     routes = {r.vehicle: r for r in mission.routes if r.waypoints}
     for vehicle in mission.vehicles:
         if vehicle.id not in routes:
-            reasons.append(f"{vehicle.id}: the plan has no route for it")
+            reasons.append(Reason(f"{vehicle.id}: the plan has no route for it"))
             continue
         if vehicle.id not in logs:
-            reasons.append(f"{vehicle.id}: no track given")
+            reasons.append(Reason("no track given", "track", vehicle.id))
             continue
         whole = _joined(vehicle.id, logs[vehicle.id])
         track, told, wrong = cleaned(mission, vehicle, whole)
         notes += told
-        reasons += wrong
+        reasons += map(Reason, wrong)
         if track is not None:
             raw[vehicle.id] = (whole, track)
     began = {i: _began(mission.vehicle(i), routes[i], log, track) for i, (log, track) in raw.items()}
@@ -109,14 +110,15 @@ def record(mission: Mission, files: Sequence[Sequence[tuple[str, Log]]], *, star
         moved = since(track, zero)
         late = began[vehicle_id] - zero
         if len(moved.time) < 2:
-            reasons.append(f"{vehicle_id}: its log ends {zero - track.time[-1]:,.0f} s before the mission's start")
+            reasons.append(Reason(f"{vehicle_id}: its log ends {zero - track.time[-1]:,.0f} s before the mission's start"))
             continue
         if abs(late) > ANOTHER_DAY:
-            reasons.append(f"{vehicle_id}: sets off {late:,.0f} s after the mission's start; is its log of another day?")
+            why = f"{vehicle_id}: sets off {late:,.0f} s after the mission's start; is its log of another day?"
+            reasons.append(Reason(why))
         elif abs(late) > LATE:
             notes.append(f"{vehicle_id}: sets off {late:,.0f} s later than planned, counted from the mission's start")
         tracks.append(until_home(mission.vehicle(vehicle_id), routes[vehicle_id], moved))
-    reasons += _on_other_routes(mission, tracks)
+    reasons += map(Reason, _on_other_routes(mission, tracks))
     return Record(tuple(tracks), tuple(notes), tuple(reasons), start)
 
 

@@ -53,7 +53,7 @@ def report_tracks(
         served=served_tasks(mission, record.tracks),
         limits=limits or {},
         settings=settings or {},
-        trouble=record.reasons,
+        trouble=[str(r) for r in record.reasons],
         notes=(*record.notes, *notes),
     )
     return Run(trace, report)

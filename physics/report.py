@@ -15,6 +15,7 @@ from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.version import VERSION
 from quarterdeck.mission.fast import FastRun
 from quarterdeck.mission.mission import Mission, Route
+from quarterdeck.mission.reason import Reason
 from quarterdeck.physics.seen import seen_fraction, whole_tracks
 from quarterdeck.physics.swath import covered_fraction, driven_tracks, planned_tracks
 from quarterdeck.physics.swept import Swept, closest_approaches, excursion, sweep
@@ -166,7 +167,7 @@ def measure(
     notes: Sequence[str] = (),
     triage: Mapping[str, Any] | None = None,
     servers: Mapping[str, str] | None = None,
-    undone: Sequence[str] = (),
+    undone: Sequence[Reason] = (),
     fast: FastRun | None = None,
 ) -> Report:
     """Measure a trace against the mission and judge it.
@@ -197,7 +198,7 @@ def measure(
         vehicles = tuple(replace(v, time_fast=fast.times[v.id]) for v in vehicles)
         tasks = tuple(replace(t, fast=fast.served.get(t.id)) for t in tasks)
     reasons += [f"task {t.id!r} not served: {t.reason}" for t in tasks if t.reason] if allowed["unserved"] == 0 else []
-    reasons += [line for line in undone if not line.startswith("task ")]
+    reasons += [str(r) for r in undone if r.kind != "undone"]
     told = tuple(reasons)
     return Report(
         mission.name,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from quarterdeck.mission.mission import Mission
+from quarterdeck.mission.reason import Reason
 from quarterdeck.physics.trace import Trace
 
 BEAT = 1.0  # s: how exactly it is known when a task was done
@@ -41,13 +42,13 @@ class TaskReport:
 
 
 def task_reports(
-    mission: Mission, trace: Trace, served: Mapping[str, float], servers: Mapping[str, str], undone: Sequence[str]
+    mission: Mission, trace: Trace, served: Mapping[str, float], servers: Mapping[str, str], undone: Sequence[Reason]
 ) -> tuple[TaskReport, ...]:
     """Return a report for each task of a mission, in its order.
 
-    `served` are the seconds at which tasks were done, `servers` by which vehicles; `undone` lines that say why others were
-    not, `task 'ID' ...: REASON` each.
+    `served` are the seconds at which tasks were done, `servers` by which vehicles; `undone` says why others were not.
     """
+    why = {r.about: r.why for r in undone if r.kind == "undone"}
     planned = {w.task: (r.vehicle, w) for r in mission.routes for w in r.waypoints if w.task is not None}
     out = []
     for task in mission.tasks:
@@ -63,8 +64,7 @@ def task_reports(
             if begin - arrival <= BEAT:
                 begin, leave = arrival, arrival + task.service_time
             drive = Service(vehicle, arrival, begin, leave, begin - arrival)
-        why = [line.split(": ", 1)[1] for line in undone if line.startswith((f"task {task.id!r}:", f"task {task.id!r} "))]
-        reason = "" if task.id in served else why[-1] if why else "nobody came to it before the run ended"
+        reason = "" if task.id in served else why.get(task.id, "nobody came to it before the run ended")
         out.append(TaskReport(task.id, plan, drive, reason))
     return tuple(out)
 

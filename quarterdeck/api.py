@@ -83,10 +83,11 @@ def _at_height(mission: Mission, terrain: Terrain | None = None, tolerance: floa
     """Return the mission over the terrain, if there is one, its ceilings looked at."""
     from quarterdeck.mission.follow import follow
     from quarterdeck.mission.heights import too_high
+    from quarterdeck.mission.reason import Reason
 
     if terrain is not None:
         mission = follow(mission, terrain, tolerance=tolerance)
-    return replace(mission, reasons=tuple(dict.fromkeys([*mission.reasons, *too_high(mission)])))
+    return replace(mission, reasons=tuple(dict.fromkeys([*mission.reasons, *map(Reason, too_high(mission))])))
 
 
 def default_method(scenario: Scenario) -> Method:

@@ -11,6 +11,7 @@ from quarterdeck.geo.scenario import Scenario, Vehicle
 from quarterdeck.geo.version import VERSION
 from quarterdeck.mission.director import Director
 from quarterdeck.mission.mission import Mission, Route, Waypoint
+from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.timing import shortfalls, timed_route
 from quarterdeck.mission.triage.director import triage
 from quarterdeck.mission.triage.outcome import Outcome, run_team
@@ -50,7 +51,7 @@ def plan_triage(
     routes = tuple(_route(v, team) for v in vehicles)
     reasons = [line for v, r in zip(vehicles, routes, strict=True) for line in shortfalls(v, r)]
     if team.search.missed > 0:
-        reasons.append(f"{team.search.missed:,.0f} m2 of the field cannot be seen from where the UGVs can go")
+        reasons.append(Reason(f"{team.search.missed:,.0f} m2 of the field cannot be seen from where the UGVs can go"))
     given = {f.name: getattr(settings, f.name) for f in fields(settings)} | {"treat": dict(settings.treat)}
     return Mission(
         name=scenario.name,

@@ -14,6 +14,7 @@ from rich.text import Text
 from quarterdeck.cli.parameters import Real
 from quarterdeck.geo.files import read_bytes, refuse_existing, write_file
 from quarterdeck.mission.mission import Mission
+from quarterdeck.mission.reason import Reason
 
 
 def not_there(ctx: click.Context, param: click.Parameter, output: Any) -> Any:  # noqa: ARG001
@@ -113,7 +114,7 @@ def console() -> Console:
     return Console(stderr=True, highlight=False, markup=False, emoji=False)
 
 
-def print_reason(screen: Console, what: str, reason: str) -> None:
+def print_reason(screen: Console, what: str, reason: Reason | str) -> None:
     """Print a line that begins with `what` in bold."""
     screen.print(Text.assemble((f"{what}:", "bold"), f" {reason}"), soft_wrap=True)
 

@@ -116,9 +116,9 @@ def _progress(
         return progress if time is None else replace(progress, time=time)
     if tracks:
         record = read_tracks(mission, tracks, start=read_time(start) if start else None)
-        wrong = [r for r in record.reasons if not any(r.startswith(f"{v}: no track") for v in stopped)]
+        wrong = [r for r in record.reasons if not (r.kind == "track" and r.about in stopped)]
         if wrong:
-            raise InputError(wrong[0])
+            raise InputError(str(wrong[0]))
         now = max(float(t.time[-1]) for t in record.tracks) if time is None else time
         progress, notes = recorded_progress(mission, record.tracks, now, stopped=stopped)
         for note in (*record.notes, *notes):

@@ -11,6 +11,7 @@ from quarterdeck.exporters.export import FORMATS, export
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.files import safe_names
 from quarterdeck.geo.scenario import Obstacle
+from quarterdeck.mission.reason import Reason
 
 
 @pytest.mark.parametrize("make", ["boats", "quads", "ugv"])
@@ -105,7 +106,7 @@ def test_a_plan_that_fails_a_check_is_for_eyes_alone(boats, tmp_path):
     cases = {
         "jumps": changed(3, x=200.0, y=31.0),
         "does not fly": changed(3, z=5.0),
-        "no battery": replace(boats, reasons=("no battery",)),
+        "no battery": replace(boats, reasons=(Reason("no battery"),)),
         "passes 'rock' at 2.00 m": replace(boats, site=replace(boats.site, obstacles=(rock,))),
     }
     for number, (why, mission) in enumerate(cases.items()):

@@ -112,7 +112,7 @@ def test_a_window_that_cannot_be_met_is_a_reason_not_an_error():
     tasks = [Task("west", (-50.0, 0.0), window=(50.0, 60.0)), Task("east", (50.0, 0.0), window=(50.0, 60.0))]
     mission = assign(yard(tasks, one), iterations=3)
     assert not mission.feasible
-    assert "after its window" in mission.reasons[0]
+    assert "after its window" in mission.reasons[0].why
 
 
 def test_a_lost_robot_leaves_nothing_skipped_and_nobody_waiting_for_ever():

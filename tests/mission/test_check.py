@@ -12,6 +12,7 @@ from quarterdeck.geo.models import load_model
 from quarterdeck.geo.scenario import Area, Obstacle, Site, Vehicle
 from quarterdeck.mission.check import check_mission, homeward
 from quarterdeck.mission.mission import Mission, Route, Waypoint
+from quarterdeck.mission.reason import Reason
 
 
 def crossing(delay: float = 0.0) -> Mission:
@@ -76,7 +77,9 @@ def test_a_leg_along_an_obstacles_edge_is_found(depth):
 def test_energy_and_the_planners_own_reasons_are_told():
     """A route beyond the battery, and what the planner said, are problems."""
     mission = crossing(30.0)
-    poor = replace(mission, routes=(replace(mission.routes[0], energy=900.0), mission.routes[1]), reasons=("no way",))
+    poor = replace(
+        mission, routes=(replace(mission.routes[0], energy=900.0), mission.routes[1]), reasons=(Reason("no way"),)
+    )
     problems = check_mission(poor)
     assert problems[0] == "no way"
     assert any("a: needs 900 Wh" in line for line in problems)

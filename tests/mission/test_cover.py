@@ -83,8 +83,9 @@ def test_too_far_is_told():
     vehicles = (replace(scenario.vehicles[0], battery=10.0), scenario.vehicles[1])
     mission = cover(replace(scenario, vehicles=vehicles))
     assert not mission.feasible
-    assert mission.reasons[0].startswith("ugv-1: needs")
-    assert "short by" in mission.reasons[0]
+    assert str(mission.reasons[0]).startswith("ugv-1: needs")
+    assert "short by" in mission.reasons[0].why
+    assert (mission.reasons[0].kind, mission.reasons[0].about) == ("energy", "ugv-1")
 
 
 def scenario_of(area, obstacles, starts, spacing):

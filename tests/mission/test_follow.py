@@ -119,13 +119,13 @@ def test_pictures_at_worst_are_those_of_the_pinhole(field):
 def test_ceilings_are_told():
     """Between waypoints too the height above ground counts; above the sea counts only where that is known."""
     low = follow(survey(ceiling=100.0), ground(1, 60.0), tolerance=10.0)
-    assert not [r for r in low.reasons if "ceiling" in r]
+    assert not [r for r in low.reasons if "ceiling" in r.why]
     close = survey(ceiling=72.0)
-    assert not [r for r in check_mission(close) if "ceiling" in r]
+    assert not [r for r in check_mission(close) if "ceiling" in r.why]
     over = follow(close, ground(1, 60.0), tolerance=10.0)
-    assert any("uav-1: reaches" in r and "its ceiling is 72 m" in r for r in over.reasons)
+    assert any("uav-1: reaches" in r.why and "its ceiling is 72 m" in r.why for r in over.reasons)
     sea = follow(survey(ceiling_amsl=550.0), ground(1, 20.0))
-    assert any("above mean sea level and its ceiling is 550 m" in r for r in sea.reasons)
+    assert any("above mean sea level and its ceiling is 550 m" in r.why for r in sea.reasons)
     assert any("ceiling is 50 m" in r for r in check_mission(survey(ceiling=50.0)))
 
 

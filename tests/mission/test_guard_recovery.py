@@ -111,7 +111,7 @@ def test_what_the_energy_left_cannot_pay_is_told_as_an_area(plan: tuple[Scenario
     weak = tuple(replace(v, endurance=60.0) for v in working)
     after = guards_from_now(mission, replace(given, vehicles=weak), served)
     assert not after.feasible
-    assert "m2 can no longer be seen: the energy left does not suffice" in after.reasons[0]
+    assert "m2 can no longer be seen: the energy left does not suffice" in after.reasons[0].why
     assert after.routes[0].duration <= 60.0
     assert len(after.reasons) == 1
 

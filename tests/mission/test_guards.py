@@ -149,7 +149,7 @@ def test_what_cannot_be_seen_is_told() -> None:
     given = replace(given, site=replace(given.site, operating=as_multipolygon(BORDER)))
     mission = plan_guards(given, range=12.0)
     assert not mission.feasible
-    unseen = float(mission.reasons[0].split(" m2 cannot be seen")[0])
+    unseen = float(mission.reasons[0].why.split(" m2 cannot be seen")[0])
     assert 8.0 < unseen < 10.5
     assert mission.figures["certificate"]["uncovered"] == pytest.approx(unseen, rel=0.05)
 

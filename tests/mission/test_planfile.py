@@ -13,6 +13,7 @@ from quarterdeck.geo.reader import read_scenario
 from quarterdeck.geo.scenario import Precedence, Task
 from quarterdeck.mission.mission import Layer, Mission, Route, Waypoint
 from quarterdeck.mission.planfile import plan_text, read_plan
+from quarterdeck.mission.reason import Reason
 
 DATA = Path(__file__).parents[2] / "data"
 
@@ -42,7 +43,7 @@ def mission(site: str = "farm_survey") -> Mission:
         spacing=25.0,
         tasks=tasks,
         figures={"poc": 0.5},
-        reasons=("uav-1: too far",),
+        reasons=(Reason("uav-1: too far"), Reason("needs 9 Wh and has 8 Wh", "energy", "uav-1")),
         layers=(Layer("region", (scenario.site.area,), ({"vehicle": "uav-1"},)),),
         input_hash="abc",
         version="0.1",

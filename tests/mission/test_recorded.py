@@ -13,6 +13,7 @@ from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.logs import Log
 from quarterdeck.geo.reader import read_scenario
 from quarterdeck.mission.progress import planned_progress
+from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.recorded import progress_state, recorded_progress
 from quarterdeck.mission.replan import Changes, replan
 from quarterdeck.mission.routes import survey_tracks
@@ -112,7 +113,7 @@ def test_another_order_counts():
     logs = {v: log for [(v, log)] in perfect(mission)}
     crossed = [[(a, logs[b])], [(b, logs[a])], *[[(v, logs[v])] for v in logs if v not in {a, b}]]
     found = record(mission, crossed)
-    assert any("are the files exchanged" in r for r in found.reasons)
+    assert any("are the files exchanged" in r.why for r in found.reasons)
     time = 0.5 * mission.routes[0].duration
     progress, _ = recorded_progress(mission, found.tracks, time)
     mine, theirs = (swath(p.tracks, mission.spacing) for p in (progress, planned_progress(mission, time)))
@@ -162,15 +163,15 @@ def test_logs_of_another_mission(columns, words):
     mission = planned("west_ant_island")
     found = record(mission, changed(perfect(mission, 5.0), "usv-2", **columns))
     assert len(found.reasons) == 1
-    assert "usv-2" in found.reasons[0]
-    assert words in found.reasons[0]
+    assert "usv-2" in str(found.reasons[0])
+    assert words in str(found.reasons[0])
 
 
 def test_a_vehicle_without_a_log():
     """It is a reason; and to replan it has to be given up, whereupon nothing of its own counts as done."""
     mission = planned("west_ant_island")
     found = record(mission, [log for log in perfect(mission, 5.0) if log[0][0] != "usv-5"])
-    assert found.reasons == ("usv-5: no track given",)
+    assert found.reasons == (Reason("no track given", "track", "usv-5"),)
     with pytest.raises(InputError, match="--lost usv-5"):
         recorded_progress(mission, found.tracks, 5000.0)
     progress, _ = recorded_progress(mission, found.tracks, 5000.0, stopped={"usv-5": float("inf")})

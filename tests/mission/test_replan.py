@@ -93,7 +93,7 @@ def test_all_but_one():
     after = replan(before, planned_progress(before, 5000.0), Changes(lost=frozenset({"usv-1", "usv-2", "usv-3", "usv-4"})))
     assert len(after.routes) == 1
     assert not after.feasible
-    assert "can no longer be covered: the energy left does not suffice" in after.reasons[0]
+    assert "can no longer be covered: the energy left does not suffice" in after.reasons[0].why
     assert not shortfalls(after.vehicles[0], after.routes[0])
     told = next(layer for layer in after.layers if layer.name == "undone")
     assert shapely.area(told.geometries).sum() == pytest.approx(after.figures["undone_m2"])

@@ -59,7 +59,22 @@ def test_a_carried_thing_that_is_lost_is_told():
     left = {t.id for t in tasks} - progress.served - {first, others[0]}
     assert sorted(visited(after)) == sorted(left)
     assert not after.feasible
-    assert any(repr(first) in r for r in after.reasons)
+    assert any((r.kind, r.about) == ("undone", first) for r in after.reasons)
+
+
+def test_a_pair_that_no_robot_can_do_whole_is_parted():
+    """The only robot that could do both tasks of a pair in one robot is lost: the first is done, the second is told."""
+    scenario = read_scenario(DATA / "inspection_hall.geojson")
+    a, b = scenario.tasks[:2]
+    first = replace(a, needs=frozenset({"arm"}), after=())
+    second = replace(b, needs=frozenset({"camera"}), after=(Precedence(a.id, "same_robot"),))
+    r1, r2 = scenario.vehicles
+    team = (replace(r1, can=frozenset({"arm", "camera"})), replace(r2, can=frozenset({"arm"})))
+    third = replace(r2, id="r3", can=frozenset({"camera"}))
+    before = assign(replace(scenario, tasks=(first, second), vehicles=(*team, third)), quick=True, iterations=5)
+    after = replan(before, planned_progress(before, 0.0), Changes(lost=frozenset({"r1"})))
+    assert visited(after) == [a.id]
+    assert [(r.kind, r.about) for r in after.reasons] == [("undone", b.id)]
 
 
 def test_a_new_task_is_done():
