@@ -3,7 +3,9 @@ export PYTHONSAFEPATH = 1
 VENV ?= .venv
 BIN = $(VENV)/bin
 OUT ?= out
-LOWEST ?= tests/geo tests/coverage tests/exporters tests/mission/test_planfile.py tests/mission/test_cover.py tests/physics/test_simulate.py
+LOWEST ?= tests/geo tests/coverage tests/exporters tests/mission/test_planfile.py tests/mission/test_cover.py tests/physics/test_simulate.py \
+	tests/campaign/test_summary.py tests/house/test_first_contact.py tests/house/test_assign_cli.py --ignore tests/exporters/test_mavsdk.py
+ALL_CORES = -n logical --dist worksteal
 
 .PHONY: demo test lint bench bench-coverage bench-physics bench-assign bench-triage soak docs docs-pictures docs-site lowest clean
 
@@ -19,7 +21,7 @@ demo: $(VENV)/installed  ## plan, simulate, draw and export a real site
 	$(BIN)/quarterdeck export $(OUT)/west_ant_island.plan.geojson --to qgc-wpl,geojson,png,rerun -o $(OUT)/ --force
 
 test: lint  ## everything that must hold
-	$(BIN)/python -m pytest -n logical --dist worksteal --cov --cov-report=term:skip-covered
+	$(BIN)/python -m pytest $(ALL_CORES) --cov --cov-report=term:skip-covered
 
 lint: $(VENV)/installed  ## style, types and layers
 	$(BIN)/ruff check .
@@ -55,7 +57,7 @@ docs-site: $(VENV)/installed  ## docs/ as a site in out/site
 	$(BIN)/python -m mkdocs build --strict
 
 lowest:  ## tests on the lowest versions that pyproject.toml allows, in an environment of its own
-	.ci/lowest .venv-lowest -q $(LOWEST)
+	.ci/lowest .venv-lowest -q $(ALL_CORES) $(LOWEST)
 
 clean:
 	rm -rf $(VENV) $(OUT) build dist *.egg-info

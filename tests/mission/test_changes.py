@@ -15,6 +15,8 @@ from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.models import load_model
 from quarterdeck.geo.scenario import Area, Obstacle, Precedence, Scenario, Site, Task, Vehicle
+from quarterdeck.geo.triangulation import triangulate
+from quarterdeck.geo.visibility import visibility_polygons
 from quarterdeck.mission.assign import assign
 from quarterdeck.mission.changes import Changes, read_changes
 from quarterdeck.mission.check import trespasses
@@ -220,12 +222,24 @@ def test_priority_of_an_area(method, tmp_path):
 
 
 def test_priority_of_an_area_for_guards():
-    """Guards of an area of a higher priority come first on every tour."""
+    """Guards of an area of a higher priority come first: it is seen whole sooner, where it was not the first already."""
     before = plan("guards")
-    after = changed(before, 0.0, Changes(priorities={"east": 5}))
-    for route in after.routes:
-        x = [w.x for w in route.waypoints if w.task]
-        assert not x or x[0] > 15.0 or min(x) == x[0] or max(x) <= 30.0 + 15.0
+    west, east = (box(x, 0, x + 30, 40) for x in (0, 30))
+    assert seen_whole(before, west) > seen_whole(before, east) + 10.0
+    assert seen_whole(changed(before, 0.0, Changes(priorities={"west": 5})), west) < seen_whole(before, west) - 10.0
+    assert seen_whole(changed(before, 0.0, Changes(priorities={"east": 5})), east) <= seen_whole(before, east) + 1e-6
+
+
+def seen_whole(mission, part):
+    """Return when the last of `part` of the yard is seen, by the views of the guards in the order of the visits."""
+    visits = np.array(sorted((w.time, w.x, w.y) for r in mission.routes for w in r.waypoints if w.task))
+    rest = part.difference(PILLAR)
+    views = visibility_polygons(triangulate(box(0, 0, 60, 40).difference(PILLAR)), visits[:, 1:], 15.0)
+    for at, view in zip(visits, views, strict=True):
+        rest = rest.difference(view)
+        if rest.area < 1e-3:
+            return at[0]
+    return np.inf
 
 
 def test_tasks(tmp_path):
