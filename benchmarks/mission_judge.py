@@ -177,7 +177,7 @@ def _needlessly_left(mission: Mission, run: Run, watched: Any, last: Mission, id
         ready = replace(vehicle, start=vehicle.home, end=vehicle.home, heading=None, endurance=spare[0], battery=spare[1])
         roads = roadmaps(Scenario(last.name, last.frame, last.site, (ready,)))
         for name, line, service, who in pieces:
-            if who not in (None, vehicle.id):
+            if who not in (None, vehicle.id) or not roads[0].polygon.buffer(0.01).covers(shapely.LineString(line)):
                 continue
             routes, missing = line_routes((ready,), [[line]], roads)
             trip = routes[0]

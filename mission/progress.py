@@ -20,7 +20,8 @@ class Progress:
     `positions` are (x, y, z) metres by vehicle, `energy` watt-hours used by vehicle, `tracks` (n, 2) lines in metres along
     which survey legs were driven, `served` the ids of tasks done. `along` says how far along its route each vehicle is, as
     the seconds at which it would be there by the plan; None: as planned, at `time`. `headings` are radians by vehicle,
-    where they are known, `servers` who did a task, where it may be another vehicle than planned.
+    where they are known, `servers` who did a task, where it may be another vehicle than planned. `begun` are the tasks that
+    are under way: by whom, and for how many seconds; None: as planned, where who is to be there is.
     """
 
     time: float
@@ -31,6 +32,7 @@ class Progress:
     along: Mapping[str, float] | None = None
     headings: Mapping[str, float] = field(default_factory=dict)
     servers: Mapping[str, str] = field(default_factory=dict)
+    begun: Mapping[str, tuple[str, float]] | None = None
 
 
 def planned_progress(mission: Mission, time: float, *, stopped: Mapping[str, float] | None = None) -> Progress:

@@ -22,7 +22,7 @@ from quarterdeck.mission.contact import Contact, within_range
 from quarterdeck.mission.director import Command, Director, Event, State
 from quarterdeck.mission.inspection import Memory as Inspected
 from quarterdeck.mission.inspection import default_director
-from quarterdeck.mission.mission import Mission, Route
+from quarterdeck.mission.mission import Mission, Route, Waypoint
 from quarterdeck.mission.progress import Progress, surveyed
 from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.replan import replan
@@ -41,7 +41,9 @@ class _Memory:
     `following` is the route that each vehicle was last told and heard; `used` each vehicle's watt-hours at `since`;
     `tracks` and `served`, tasks and who did them, are what was done before that plan (of guards: since then); `given_up`
     who is held for lost; `wake` when the next silence has lasted too long. `barred` are vehicles and the tasks to which
-    they found no way, `undone` what earlier plans told could not be done.
+    they found no way, `undone` what earlier plans told could not be done. `untried` have not been heard of since they were
+    told of the plan: how far they say to have come is how far they had come by the one before it. `sent` are the waypoints
+    that each was commanded last, `serving` the task that it is at by them, and since when.
     """
 
     mission: Mission
@@ -57,6 +59,9 @@ class _Memory:
     wake: float = inf
     barred: frozenset[tuple[str, str]] = frozenset()
     undone: tuple[Reason, ...] = ()
+    untried: frozenset[str] = frozenset()
+    sent: Mapping[str, tuple[Waypoint, ...]] = field(default_factory=dict)
+    serving: Mapping[str, tuple[str, float]] = field(default_factory=dict)
 
 
 def recovering(mission: Mission, *, delay: float = 0.0, tell: Tell | None = None) -> Director:
@@ -94,6 +99,8 @@ def recovering(mission: Mission, *, delay: float = 0.0, tell: Tell | None = None
             given_up=(now.given_up | due) - back,
             served=served | dict(now.served),
             barred=now.barred | {(e.vehicle, e.subject) for e in barred},
+            untried=now.untried - {v for v, s in states.items() if s.alive and time > now.since},
+            serving={**now.serving, **_at_work(now, time, states)},
         )
         stale = {v for v in heard & plan.keys() if now.following.get(v) is not plan[v]}  # replanned while it was silent
         if due & plan.keys() or back or stale or barred:
@@ -104,10 +111,22 @@ def recovering(mission: Mission, *, delay: float = 0.0, tell: Tell | None = None
         now = replace(now, wake=min((now.missed or {}).values(), default=inf))
         events = tuple(e for e in events if e.kind not in ("lost", "returned"))  # whoever waits for the silent waits on
         commands, inner = now.director(time - now.since, states, events, now.inner)
-        return commands, replace(now, inner=inner)
+        sent = {**now.sent, **{v: c.waypoints for v, c in commands.items() if states[v].alive}}
+        return commands, replace(now, inner=inner, sent=sent)
 
     ranged = mission.method != "guards" and any(v.range is not None for v in mission.vehicles)
     return within_range(direct, mission) if ranged else direct
+
+
+def _at_work(now: _Memory, time: float, states: Mapping[str, State]) -> dict[str, tuple[str, float]]:
+    """Return the task that each vehicle is at, of those that are heard and at one, and since when."""
+    found = {}
+    for name, state in states.items():
+        task = next((w.task for w in now.sent.get(name, ())[state.reached :][:1] if state.alive), None)
+        if task is not None:
+            before, since = now.serving.get(name, ("", time))
+            found[name] = (task, since if task == before else time)
+    return found
 
 
 def _replanned(
@@ -127,7 +146,8 @@ def _replanned(
     tracks = list(now.tracks)
     for name, route in now.following.items() if now.mission.spacing is not None else ():
         state = states[name]
-        tracks += surveyed(route, min(state.reached + 1, len(route.waypoints)), (state.x, state.y, state.z))
+        reached = 1 if name in now.untried else min(state.reached + 1, len(route.waypoints))
+        tracks += surveyed(route, reached, (state.x, state.y, state.z))
     progress = Progress(
         time=time - now.since,
         positions={v: (s.x, s.y, s.z) for v, s in states.items()},
@@ -136,6 +156,7 @@ def _replanned(
         served=frozenset(now.served),
         servers=now.served,
         headings={v: s.heading for v, s in states.items()},
+        begun={task: (v, time - since if states[v].alive else 0.0) for v, (task, since) in now.serving.items()},
     )
     wrecks = {w.id: w for v in sorted(now.given_up) if (w := _wreck(first, v, working, states)) is not None}
     known = {o.id for o in now.mission.site.obstacles}
@@ -147,7 +168,7 @@ def _replanned(
         gone=frozenset(known & again) - {o.id for o in first.site.obstacles},  # what the site has stays, whatever its name
     )
     try:
-        after = replan(now.mission, progress, changes)
+        after = replan(now.mission, progress, changes, anew=True)
     except InputError as error:
         return replace(now, undone=(*now.undone, Reason(f"no new plan at {time:.0f} s: {error}", "plan")))
     if tell:
@@ -165,6 +186,9 @@ def _replanned(
         served={} if after.method == "guards" else now.served,  # its layer says what is seen
         used={v: s.energy_used for v, s in states.items()},
         undone=tuple(dict.fromkeys(left)),
+        untried=frozenset(told),
+        sent={v: way for v, way in now.sent.items() if v not in told},
+        serving={v: work for v, work in now.serving.items() if v not in told},
     )
 
 

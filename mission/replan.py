@@ -21,17 +21,20 @@ from quarterdeck.mission.timing import shortfalls, timed_route
 NOTHING = Changes()
 
 
-def replan(mission: Mission, progress: Progress, changes: Changes = NOTHING, *, seed: int | None = None) -> Mission:
+def replan(
+    mission: Mission, progress: Progress, changes: Changes = NOTHING, *, seed: int | None = None, anew: bool = False
+) -> Mission:
     """Return the mission from `progress.time` on. Its times count from then; its vehicles start where they are.
 
-    What is done stays done. Without changes each route is what is left of it. After a change the survivors share what is
-    left so that all are done at about the same time, with the energy that they have, and come home; what nobody can do any
-    more is told in the mission's reasons. Vehicles given up are kept in `lost`: they may come back.
+    What is done stays done. Without changes each route is what is left of it, unless all is to be shared out `anew`. After
+    a change the survivors share what is left so that all are done at about the same time, with the energy that they have,
+    and come home; what nobody can do any more is told in the mission's reasons. Vehicles given up are kept in `lost`: they
+    may come back.
 
     Raises InputError if a change names what is not in the plan, means nothing to it, or nobody is left.
     """
     check_changes(mission, changes)
-    if not changes and as_planned(mission, progress):
+    if not (changes or anew) and as_planned(mission, progress):
         return with_confirmed(_rest(mission, progress), progress.served)
     seed = mission.seed if seed is None else seed
     site = changed_site(mission.site, changes)

@@ -29,8 +29,12 @@ def assign_from_now(mission: Mission, scenario: Scenario, progress: Progress, *,
     any more is left out of the routes, with what comes after it, and told; it stays among the mission's tasks.
     """
     vehicles = tuple(replace(v, can=v.can | {_itself(v.id)}) for v in scenario.vehicles)
-    tasks = tasks_left(mission, scenario.tasks, progress, {v.id for v in scenario.vehicles})
-    left, reasons, undone = list(tasks), list[Reason](), list[str]()
+    working = {v.id for v in scenario.vehicles}
+    tasks = tasks_left(mission, scenario.tasks, progress, working)
+    begun = {t: v for t, (v, _) in _under_way(mission, progress).items() if v in working}
+    # Who began a task finishes it; the mission's own tasks stay free of that, for a replan after he is lost in his turn.
+    bound = [replace(t, needs=t.needs | {_itself(begun[t.id])}) if t.id in begun else t for t in tasks]
+    left, reasons, undone = bound, list[Reason](), list[str]()
     while left:
         given: dict[str, Any] = {
             "first": _rows(mission, vehicles, left),
@@ -120,10 +124,8 @@ def tasks_left(mission: Mission, tasks: Sequence[Task], progress: Progress, work
         if task.id in progress.served:
             continue
         if task.id in begun:
-            vehicle, seconds = begun[task.id]
-            service = max(0.0, seconds + task.service_time - old[task.id].service_time)
-            needs = task.needs | {_itself(vehicle)}
-            left.append(replace(task, service_time=service, needs=needs, after=(), window=(0.0, float("inf"))))
+            service = max(0.0, begun[task.id][1] + task.service_time - old[task.id].service_time)
+            left.append(replace(task, service_time=service, after=(), window=(0.0, float("inf"))))
         else:
             left.append(_freed(task, doer, progress))
     return tuple(left)
@@ -131,6 +133,9 @@ def tasks_left(mission: Mission, tasks: Sequence[Task], progress: Progress, work
 
 def _under_way(mission: Mission, progress: Progress) -> dict[str, tuple[str, float]]:
     """Return the tasks whose service has begun: by which vehicle, and how many seconds are left of it."""
+    if progress.begun is not None:
+        service = {t.id: t.service_time for t in mission.tasks}
+        return {t: (v, max(0.0, service[t] - so_far)) for t, (v, so_far) in progress.begun.items() if t in service}
     found = {}
     for route in mission.routes:
         x, y, _ = progress.positions[route.vehicle]

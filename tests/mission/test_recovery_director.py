@@ -1,21 +1,31 @@
 """The director that recovers, in PyBullet: what the lost were to cover is covered by the others."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import pytest
 
+from quarterdeck.coverage.metrics import track_length
 from quarterdeck.geo.reader import read_scenario
 from quarterdeck.mission.cover import cover
+from quarterdeck.mission.director import Event, State
+from quarterdeck.mission.mission import unbroken
 from quarterdeck.mission.recovery import recovering
 
 DATA = Path(__file__).parents[2] / "data"
+SPACING = {"plant_yard": 5.0, "farm_survey": 40.0, "west_ant_island": 100.0}
 
 
 @cache
 def plan(site):
     """Return a coarse plan of a sample site."""
-    return cover(read_scenario(DATA / f"{site}.geojson"), spacing={"plant_yard": 5.0, "farm_survey": 40.0}[site])
+    return cover(read_scenario(DATA / f"{site}.geojson"), spacing=SPACING[site])
+
+
+def to_survey(mission):
+    """Return the metres that are to be surveyed."""
+    return sum(track_length(line) for r in mission.routes for line in unbroken(r.xyz[:, :2], r.survey))
 
 
 @pytest.mark.parametrize(("site", "fault"), [("plant_yard", "ugv-1@300"), ("farm_survey", "uav-2@200")])
@@ -46,3 +56,38 @@ def test_false_alarm_changes_nothing():
     run = simulate(mission, director=director, faults=["comms:ugv-1@100-130"], sample=1.0)
     assert not told
     assert run.report.passed
+
+
+def test_who_is_lost_as_it_is_told_of_a_plan_has_done_nothing_of_it():
+    """What a vehicle was given in the second in which it is lost goes to the others, however far it had come before."""
+    mission = plan("west_ant_island")
+    told = []
+    director = recovering(mission, tell=lambda *plan: told.append(plan[1]))
+    states = {r.vehicle: State(*r.xyz[-1], reached=len(r.waypoints) - 1) for r in mission.routes}  # all are home
+    first, second, *others = states
+    states[first] = State(*mission.routes[0].xyz[0], reached=0, idle=False)
+    _, memory = director(0.0, states, (), None)
+    states[first] = State(*mission.routes[0].xyz[0], alive=False)
+    _, memory = director(10.0, states, (Event("lost", first),), memory)
+    states[second] = replace(states[second], alive=False)  # as it was when it was told
+    states |= {v: replace(states[v], reached=0, idle=False) for v in others}
+    director(10.5, states, (Event("lost", second),), memory)
+    one, other = map(to_survey, told)
+    assert other == pytest.approx(one, rel=0.02)
+
+
+def test_who_comes_back_late_drives_all_that_is_left():
+    """A vehicle heard again, with nobody else left, goes on from where it is, not from where by the plan it should be."""
+    mission = plan("plant_yard")
+    told = []
+    director = recovering(mission, tell=lambda *plan: told.append(plan[1]))
+    late, other = (r.vehicle for r in mission.routes)
+    states = {r.vehicle: State(*r.xyz[0], idle=False) for r in mission.routes}
+    _, memory = director(0.0, states, (), None)
+    states |= {other: State(*mission.routes[1].xyz[0], alive=False)}
+    _, memory = director(1.0, states, (Event("lost", other),), memory)
+    states |= {late: State(*mission.routes[0].xyz[0], alive=False)}
+    _, memory = director(2.0, states, (Event("lost", late),), memory)
+    states |= {late: State(*mission.routes[0].xyz[0], idle=False)}
+    director(2.0 + told[0].routes[0].duration / 2, states, (Event("returned", late),), memory)
+    assert to_survey(told[-1]) == pytest.approx(to_survey(mission), rel=0.02)

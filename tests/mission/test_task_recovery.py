@@ -46,6 +46,19 @@ def test_all_done_goes_home():
     assert after.feasible
 
 
+def test_who_began_a_task_and_is_lost_leaves_it_to_others():
+    """A service under way is finished by who began it, as far as it really was, until he too is lost."""
+    before = plan()
+    task = next(w.task for w in before.routes[0].waypoints if w.task)
+    begun = replace(planned_progress(before, 0.0), begun={task: ("r1", 4.0)})
+    after = replan(before, begun, anew=True)
+    first = next(w for w in after.routes[0].waypoints if w.task)
+    assert (first.task, first.hold) == (task, pytest.approx(6.0))
+    last = replan(after, planned_progress(after, 0.0), Changes(lost=frozenset({"r1"})))
+    assert task in visited(last)
+    assert last.figures["undone"] == []
+
+
 def test_a_carried_thing_that_is_lost_is_told():
     """A task in the same robot as one that a lost robot has done can't be done, nor what comes after it: both are told."""
     before = plan()
