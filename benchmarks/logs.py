@@ -73,7 +73,10 @@ def written(mission: Mission, folder: Path, ending: str, until: float) -> list[s
         if ending == "npz":
             columns.append((t, x, y, heading, route.energy * t / route.duration))
             continue
-        {"bin": _bin, "tlog": _tlog, "gpx": _gpx, "csv": _csv}[ending](path, t, lonlat, heading)
+        if ending == "gpx":
+            _gpx(path, t, lonlat)
+        else:
+            {"bin": _bin, "tlog": _tlog, "csv": _csv}[ending](path, t, lonlat, heading)
         paths.append(f"{route.vehicle}={path}")
     if ending == "npz":
         longest = max(columns, key=lambda c: len(c[0]))[0]
@@ -145,7 +148,7 @@ def _tlog(path: Path, t: np.ndarray, lonlat: np.ndarray, heading: np.ndarray) ->
     path.write_bytes(other.tobytes())
 
 
-def _gpx(path: Path, t: np.ndarray, lonlat: np.ndarray, heading: np.ndarray) -> None:  # noqa: ARG001
+def _gpx(path: Path, t: np.ndarray, lonlat: np.ndarray) -> None:
     when = np.datetime_as_string(np.round((BEGAN + t) * 1e3).astype("datetime64[ms]"))
     points = (
         f'<trkpt lat="{lat:.7f}" lon="{lon:.7f}"><time>{moment}Z</time></trkpt>'

@@ -47,6 +47,11 @@ def measure(tracks: Sequence[np.ndarray], area: MultiPolygon, grid: Grid) -> Fig
     )
 
 
+def covered_fraction(tracks: Sequence[np.ndarray], area: MultiPolygon, spacing: float) -> float:
+    """Return the part of `area` within half of `spacing` of a track, from 0 to 1; 0 where there is nothing to cover."""
+    return 1.0 - uncovered(tracks, area, spacing).area / area.area if area.area > 0 and len(tracks) else 0.0
+
+
 def uncovered(tracks: Sequence[np.ndarray], area: MultiPolygon, spacing: float) -> MultiPolygon:
     """Return the part of `area` farther than half of `spacing` from every track."""
     return as_multipolygon(shapely.difference(area, swath(tracks, spacing), grid_size=1e-6 * spacing))

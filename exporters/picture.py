@@ -17,8 +17,9 @@ from quarterdeck.exporters.places import file_stems, spacing_words
 from quarterdeck.geo.palette import CASUALTY, SITE, colours
 from quarterdeck.geo.scenario import Obstacle
 from quarterdeck.mission.mission import Mission
+from quarterdeck.mission.routes import survey_lines
 from quarterdeck.physics.report import Report
-from quarterdeck.physics.swath import driven_tracks, planned_tracks
+from quarterdeck.physics.swath import driven_tracks
 from quarterdeck.physics.trace import Trace
 
 
@@ -153,8 +154,10 @@ def _run(chart: Axes, mission: Mission, trace: Trace, palette: list[str]) -> Non
     if mission.spacing is None:
         return
     planned, driven = (
-        shapely.union_all([shapely.buffer(track, mission.spacing / 2, quad_segs=8) for track in tracks])
-        for tracks in (planned_tracks(mission.routes), driven_tracks(trace))
+        shapely.union_all(
+            [shapely.buffer(shapely.linestrings(track), mission.spacing / 2, quad_segs=8) for track in tracks]
+        )
+        for tracks in (survey_lines(mission.routes), driven_tracks(trace))
     )
     missed = planned.intersection(mission.site.coverable).difference(driven)
     # Slivers along every track's edge, which no eye resolves, would colour the whole map.

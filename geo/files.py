@@ -19,8 +19,16 @@ def read_bytes(source: str | Path) -> bytes:
     try:
         return Path(source).read_bytes()
     except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or error
-        raise InputError(f"{source}: cannot be read ({why}); give the path of a file") from None
+        raise _unreadable(source, error) from None
+
+
+def refuse_missing(source: str | Path) -> None:
+    """Raise InputError if nothing is at `source`; `-` is standard input."""
+    try:
+        if str(source) != "-":
+            Path(source).stat()
+    except (OSError, ValueError) as error:
+        raise _unreadable(source, error) from None
 
 
 def refuse_existing(path: Path, *, force: bool) -> None:
@@ -31,6 +39,10 @@ def refuse_existing(path: Path, *, force: bool) -> None:
         raise InputError(f"{path} cannot be written ({error.strerror or error}); choose another place with -o") from None
     if exists and not force:
         raise InputError(f"{path} exists; give --force to overwrite it, or another name")
+
+
+def _unreadable(source: str | Path, error: OSError | ValueError) -> InputError:
+    return InputError(f"{source}: cannot be read ({getattr(error, 'strerror', None) or error}); give the path of a file")
 
 
 def write_file(path: Path, content: bytes | str, *, force: bool = False) -> Path:

@@ -14,6 +14,7 @@ from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.files import read_bytes
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.importers import as_geojson
+from quarterdeck.geo.kinds import kind_of
 from quarterdeck.geo.scenario import as_multipolygon
 
 STDIN = "standard input"
@@ -46,7 +47,8 @@ def opened(source: str | Path | Document) -> Document:
     try:
         return Document(name, data, parse(data))
     except InputError as error:
-        raise InputError(f"{name}: {error}") from None
+        kind = kind_of(data)
+        raise InputError(f"{name}: is {kind}" if kind else f"{name}: {error}") from None
 
 
 def parse(data: bytes) -> dict[str, Any]:

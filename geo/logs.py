@@ -15,6 +15,7 @@ from lxml import etree
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.frame import Frame
+from quarterdeck.geo.kinds import kind_of
 
 UNIX = 1e8  # s: a larger number of seconds in a CSV file counts from 1970, a smaller one from the mission's start
 
@@ -67,6 +68,8 @@ def read_logs(path: str) -> list[Log]:
         from quarterdeck.geo.telemetry import read_telemetry
 
         return read_telemetry(path, data)
+    if (kind := kind_of(data)) is not None:
+        raise InputError(f"{path}: is {kind}; a log is a .bin, .tlog, .gpx, .csv, or what `simulate --trace` wrote")
     if not data or b"\0" in data[:4096]:
         raise InputError(
             f"{path}: is no log that is known; give a .bin, .tlog, .gpx, .csv, or what `simulate --trace` wrote"

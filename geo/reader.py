@@ -14,6 +14,7 @@ from quarterdeck.geo.depths import least_depth, read_soundings
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.geojson import Document, opened, position_problem, positions, read_corridor, read_polygon
+from quarterdeck.geo.kinds import CHANGES, SITE, kind_of_json
 from quarterdeck.geo.models import DEFAULT_MODEL, load_model
 from quarterdeck.geo.properties import GEOMETRIES, LINES, property_problems
 from quarterdeck.geo.scenario import (
@@ -69,14 +70,15 @@ def examine(source: str | Path | Document) -> tuple[Scenario | None, list[str]]:
     return _read(opened(source))
 
 
-def read_obstacles(source: str | Path, frame: Frame) -> tuple[Obstacle, ...]:
+def read_obstacles(source: str | Path | Document, frame: Frame) -> tuple[Obstacle, ...]:
     """Return the obstacles in a GeoJSON file, whatever else is in it, in metres of `frame`.
 
     Raises InputError as `read_scenario` does, and if there are none.
     """
-    obstacles = read_additions(source, frame).site.obstacles
+    document = opened(source)
+    obstacles = read_additions(document, frame).site.obstacles
     if not obstacles:
-        raise InputError(f'{source}: no feature has the role "obstacle"')
+        raise InputError(f'{document.name}: no feature has the role "obstacle"')
     return obstacles
 
 
@@ -91,15 +93,12 @@ def _read(
 ) -> tuple[Scenario | None, list[str]]:
     """Return the scenario, or None, and all problems found; with a `frame` given, nothing in particular is required."""
     content = document.content
+    kind = kind_of_json(content)
+    if kind not in (None, SITE, CHANGES):
+        return None, [f"is {kind}"]
     problems: list[str] = []
     counted = [(i, raw) for i, raw in enumerate(content["features"]) if frame is None or added(raw)]
-    features = [f for i, raw in counted if (f := _feature(i, raw, problems))]
-    if frame is None:
-        problems += [
-            f'{f["place"]}: "change" belongs into a file for `quarterdeck replan --changes`; a site has none'
-            for f in features
-            if f["properties"].get("change") is not None
-        ]
+    features = [f for i, raw in counted if (f := _feature(i, raw, problems, site=frame is None))]
     required = ("area", "task", "casualty") if frame is None else tuple(GEOMETRIES)
     if not any(f["role"] in required for f in features) and not problems:
         problems.append('no feature has the role "area" or "task"; give the polygon to be covered "role": "area"')
@@ -146,7 +145,7 @@ def _read(
     return (None if problems else scenario), problems
 
 
-def _feature(index: int, raw: Any, problems: list[str]) -> dict[str, Any] | None:
+def _feature(index: int, raw: Any, problems: list[str], *, site: bool) -> dict[str, Any] | None:
     """Check one feature's form; return it with `place`, `role`, `id`, or None where it is wrong or not ours."""
     place = f"features[{index}]"
     if not isinstance(raw, dict) or raw.get("type") != "Feature":
@@ -159,6 +158,9 @@ def _feature(index: int, raw: Any, problems: list[str]) -> dict[str, Any] | None
     given = properties.get("id") if properties.get("id") is not None else raw.get("id")
     if given is not None:
         place = f"{place} ({given!r})"
+    if site and properties.get("change") is not None:
+        problems.append(f'{place}: "change" belongs into a file for `quarterdeck replan --changes`; a site has none')
+        return None
     role = properties.get("role")
     if role is None:
         problems.append(f'{place}: has no role; give it the property "role": one of {", ".join(GEOMETRIES)}')

@@ -14,7 +14,7 @@ from shapely import MultiPolygon
 
 from quarterdeck.coverage.division import Division, distinct_entries, divide
 from quarterdeck.coverage.edge import Edge, lay_tracks
-from quarterdeck.coverage.metrics import measure, track_length, uncovered
+from quarterdeck.coverage.metrics import covered_fraction, measure, track_length
 from quarterdeck.coverage.parts import allot, connected_parts, whole_targets
 from quarterdeck.coverage.placement import Method, place
 from quarterdeck.coverage.shares import even_shares, shares
@@ -27,7 +27,7 @@ from quarterdeck.geo.transit import Roadmap, roadmap, shortest_paths
 from quarterdeck.geo.version import VERSION
 from quarterdeck.mission.mission import Layer, Mission, Route, unbroken
 from quarterdeck.mission.reason import Reason
-from quarterdeck.mission.routes import survey_routes, survey_tracks
+from quarterdeck.mission.routes import survey_lines, survey_routes
 from quarterdeck.mission.timing import seconds_out
 
 MAX_HYPERVERTICES = 1_000_000  # of which 77,000 take 0.2 GB beside what Python takes, and 38 s
@@ -88,12 +88,9 @@ def cover_grid(
         done = again
     regions, routes = done.regions, done.routes
     figures = asdict(measure([t for own in done.tracks for t in own], site.coverable, grid))
-    missed = uncovered(
-        [t for v, r in zip(vehicles, routes, strict=True) for t in survey_tracks(v, r)], site.coverable, step
-    )
     cells = np.array([region.cells for region in regions])
     figures |= {
-        "poc_with_turns": 1.0 - missed.area / site.coverable.area,
+        "poc": covered_fraction(survey_lines(routes), site.coverable, step),  # turns have shortened some tracks
         "hypervertices": int(grid.hypervertices.sum()),
         "lattice": {"angle": grid.angle, "origin": grid.origin},
         "makespan": max(r.duration for r in routes),

@@ -9,7 +9,7 @@ from shapely import LineString
 
 from quarterdeck.coverage.laps import lap_space
 from quarterdeck.coverage.lines import Lines, lay_lines, split_area
-from quarterdeck.coverage.metrics import measure
+from quarterdeck.coverage.metrics import covered_fraction, measure
 from quarterdeck.coverage.placement import place
 from quarterdeck.coverage.shares import shares
 from quarterdeck.geo.scenario import Scenario, Vehicle
@@ -18,7 +18,7 @@ from quarterdeck.geo.version import VERSION
 from quarterdeck.mission.cover import covering, divided, roadmaps, trackable
 from quarterdeck.mission.mission import Layer, Leg, Mission, Route
 from quarterdeck.mission.reason import Reason
-from quarterdeck.mission.routes import way_routes
+from quarterdeck.mission.routes import survey_lines, way_routes
 from quarterdeck.mission.seafloor import seen, spreads
 
 ROUNDS = 2  # of dividing again, once it is known how much there is to drive where
@@ -86,7 +86,9 @@ def plan_lines(
             break
         done = again
     laid, routes, reasons = done.laid, done.routes, done.reasons
-    figures = asdict(measure([t for lines in laid for t in lines.tracks], scenario.site.coverable, grid))
+    site = scenario.site.coverable
+    figures = asdict(measure([t for lines in laid for t in lines.tracks], site, grid))
+    figures["poc"] = covered_fraction(survey_lines(routes), site, step)
     del figures["turns"], figures["turns_per_1000_m2"], figures["cell_poc"]  # of lanes of a grid; there is none here
     if sounded:  # one width does not say what is covered
         del figures["overlap"]

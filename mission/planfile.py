@@ -19,6 +19,7 @@ from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.features import collection, degrees, feature, geometry, point_feature, polygon_feature, position
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.geojson import Document, opened
+from quarterdeck.geo.kinds import kind_of_json
 from quarterdeck.geo.models import VehicleModel
 from quarterdeck.geo.palette import CASUALTY, colours
 from quarterdeck.geo.properties import PROPERTIES, property_problems
@@ -153,7 +154,8 @@ def read_plan(source: str | Path | Document) -> Mission:
         features = _features(document)
         headers = _headers(features)
         if not headers:
-            raise InputError("is a site or another GeoJSON, not a PLAN; make one with `quarterdeck plan`")
+            kind = kind_of_json(document.content) or "another GeoJSON"
+            raise InputError(f"not a PLAN, but {kind}; `plan`, `assign` and `triage --plan` make PLANs")
         if headers[0].get("format") != FORMAT:
             raise InputError(f"is a PLAN of format {headers[0].get('format')}, this version reads {FORMAT}; plan it again")
         try:

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,8 @@ import shapely
 
 from quarterdeck.coverage.metrics import track_length
 from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.files import read_bytes
+from quarterdeck.geo.kinds import REPORT, kind_of
 from quarterdeck.mission.matching import Followed, follow, planned_time
 from quarterdeck.mission.mission import Mission, Route, unbroken
 from quarterdeck.mission.progress import Progress, planned_progress
@@ -122,8 +123,9 @@ def progress_state(mission: Mission, progress: Progress) -> dict[str, Any]:
 
 def read_state(mission: Mission, path: str, *, lost: frozenset[str] = frozenset()) -> Progress:
     """Return the progress that a report tells. Raises InputError if it tells none, or not of this mission."""
+    data = read_bytes(path)
     try:
-        document = json.loads(Path(path).read_text(encoding="utf-8"))
+        document = json.loads(data)
         state = document["state"]
         places = {v: s["position"] for v, s in state["vehicles"].items()}
         xy = {v: mission.frame.to_metres(np.array([place[:2]]))[0] for v, place in places.items()}
@@ -136,12 +138,9 @@ def read_state(mission: Mission, path: str, *, lost: frozenset[str] = frozenset(
             along={v: float(s["along"]) for v, s in state["vehicles"].items()},
         )
         of = state["input_hash"]
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error}); give a report") from None
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError):
-        raise InputError(
-            f"{path}: is no report with a state in it; write one with `simulate` or `report --report`"
-        ) from None
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError):
+        kind = f"is {kind}" if (kind := kind_of(data)) not in (None, REPORT) else "is no report with a state in it"
+        raise InputError(f"{path}: {kind}; write a report with `simulate` or `report --report`") from None
     if of != mission.input_hash:
         raise InputError(f"{path}: is the report of another plan (its site's SHA-256 differs)")
     for vehicle in mission.vehicles:

@@ -1,6 +1,6 @@
 """From closed survey tracks to routes: out, round them, home; launches staggered, altitudes layered, corners drivable."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from shapely import LineString, Point
@@ -113,9 +113,14 @@ def _linked(vehicle: Vehicle, lines: Sequence[np.ndarray], road: Roadmap) -> tup
     return np.concatenate(points), legs, missing
 
 
+def survey_lines(routes: Iterable[Route]) -> list[np.ndarray]:
+    """Return the (n, 2) lines in metres along which routes survey, legs that follow one another joined."""
+    return [line for route in routes for line in unbroken(route.xyz[:, :2], route.survey)]
+
+
 def survey_tracks(vehicle: Vehicle, route: Route) -> list[np.ndarray]:
     """Return the (n, 2) lines in metres along which a route surveys, corners rounded as the vehicle drives them."""
-    return [driven(line, vehicle.turn_radius) for line in unbroken(route.xyz[:, :2], route.survey)]
+    return [driven(line, vehicle.turn_radius) for line in survey_lines([route])]
 
 
 def _transit_height(vehicles: Sequence[Vehicle], index: int) -> float:

@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import shapely
 from shapely.geometry.base import BaseGeometry
 
 from quarterdeck.coverage.metrics import uncovered
@@ -88,8 +87,7 @@ def missed(mission: Mission, trace: Trace) -> BaseGeometry:
         return unseen(mission, whole_tracks(trace, TOLERANCE))
     if mission.spacing is None:
         raise InputError(f"a plan made by {mission.method!r} covers nothing; it leaves no gaps")
-    lines = [shapely.get_coordinates(line) for line in driven_tracks(trace)]
-    return uncovered(lines, mission.site.coverable, mission.spacing)
+    return uncovered(driven_tracks(trace), mission.site.coverable, mission.spacing)
 
 
 def observed_trace(mission: Mission, tracks: Sequence[Track], followed: Sequence[Followed]) -> tuple[Trace, list[str]]:

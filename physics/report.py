@@ -11,13 +11,15 @@ from typing import Any
 import numpy as np
 from shapely import LineString
 
+from quarterdeck.coverage.metrics import covered_fraction
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.version import VERSION
 from quarterdeck.mission.fast import FastRun
 from quarterdeck.mission.mission import Mission, Route
 from quarterdeck.mission.reason import Reason
+from quarterdeck.mission.routes import survey_lines
 from quarterdeck.physics.seen import seen_fraction, whole_tracks
-from quarterdeck.physics.swath import covered_fraction, driven_tracks, planned_tracks
+from quarterdeck.physics.swath import driven_tracks
 from quarterdeck.physics.swept import Swept, closest_approaches, excursion, sweep
 from quarterdeck.physics.task_report import TaskReport, task_reports
 from quarterdeck.physics.trace import Trace
@@ -274,8 +276,9 @@ def _figures(
     """
     planned = driven = None
     if mission.spacing is not None and any(route.survey.any() for route in mission.routes):
-        planned = covered_fraction(mission.site, planned_tracks(mission.routes), mission.spacing)
-        driven = covered_fraction(mission.site, driven_tracks(trace), mission.spacing)
+        area = mission.site.coverable
+        planned = covered_fraction(survey_lines(mission.routes), area, mission.spacing)
+        driven = covered_fraction(driven_tracks(trace), area, mission.spacing)
     elif mission.method == "guards":
         routes = [LineString(route.xyz[:, :2]) for route in mission.routes if len(route.waypoints) > 1]
         planned, driven = seen_fraction(mission, routes), seen_fraction(mission, whole_tracks(trace, 0.02))

@@ -17,6 +17,7 @@ from quarterdeck.campaign.plans import PLAN
 from quarterdeck.campaign.triage import TEAM, TRIAGE
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.files import read_bytes
+from quarterdeck.geo.kinds import STUDY, kind_of
 from quarterdeck.geo.reader import read_scenario
 from quarterdeck.mission.planfile import read_plan
 from quarterdeck.physics.faults import read_faults
@@ -59,9 +60,12 @@ def read_study(path: Path) -> Study:
     Raises InputError, in one line that names the key, if the file or a key is wrong or a fault names no vehicle of the
     plan.
     """
+    data = read_bytes(path)
+    if (kind := kind_of(data)) not in (None, STUDY):
+        raise InputError(f"{path}: is {kind}; a study is TOML, see docs/campaign.md")
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, RecursionError) as error:
+        document = tomllib.loads(data.decode("utf-8"))
+    except (UnicodeDecodeError, RecursionError) as error:
         raise InputError(f"{path}: cannot be read ({error}); give the path of a study in TOML") from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: not valid TOML: {error}") from None

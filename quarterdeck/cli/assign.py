@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from quarterdeck.cli.files import reads, takes, writes
 from quarterdeck.cli.output import (
     console,
     emit,
     force_option,
     minutes,
-    not_there,
     output_option,
     print_cut,
     print_reason,
@@ -54,7 +54,7 @@ class PriorityFunction(click.ParamType):
 
 
 @click.command(short_help="Visit tasks with priority, time and precedence.")
-@click.argument("site", default="-")
+@takes("site", default="-")
 @output_option
 @click.option("--objective", type=Choice(["operator", "paper"]), default="operator", show_default=True,
               help="Makespan and urgency in seconds; or eq. 4-6 of the paper and its own genetic algorithm.")  # fmt: skip
@@ -63,20 +63,13 @@ class PriorityFunction(click.ParamType):
 @click.option("--priority-function", type=PriorityFunction(), default="linear", show_default=True,
               help="How cost grows with time: linear, power:SCALE,EXPONENT or logistic:MIDPOINT,WIDTH (s).")  # fmt: skip
 @click.option("--tiers", is_flag=True, help="No vehicle does a task of lower priority before one of higher.")
-@click.option(
-    "--map", "map_file", metavar="FILE.yaml", help="Drive on this ROS map_server map, not on the site's polygons."
-)
+@reads("--map", "map_file", metavar="FILE.yaml", help="Drive on this ROS map_server map, not on the site's polygons.")
 @click.option(
     "--map-origin",
     type=Numbers("LON,LAT", 2),
     help="Where the map's (0, 0) lies; default what the map says, else the site's centre.",
 )
-@click.option(
-    "--write-map",
-    metavar="FILE.yaml",
-    callback=not_there,
-    help="Write the site's ground map for map_server, .yaml and .pgm.",
-)
+@writes("--write-map", metavar="FILE.yaml", help="Write the site's ground map for map_server, .yaml and .pgm.")
 @click.option("--resolution", type=Real(min=0, min_open=True), help="Side of the map's cells, m.")
 @click.option("--heuristic", type=Choice(["none", "octile", "manhattan"]), default="none", show_default=True,
               help="Dijkstra; A*; or A* with the paper's heuristic, inadmissible: ways may be longer.")  # fmt: skip

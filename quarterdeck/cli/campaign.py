@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from quarterdeck.cli.files import takes
 from quarterdeck.cli.output import console, force_option, print_reason
 from quarterdeck.cli.parameters import Real
 
@@ -24,7 +25,7 @@ MOST_MEANS = 12  # combinations whose means are printed; those of more are in su
 
 
 @click.command(short_help="Many runs of one plan, or of triage, on this machine or a cluster.")
-@click.argument("study", type=click.Path(path_type=Path))
+@takes("study", pipe=False)
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path), help="Folder for the results (default: STUDY.runs beside it)."
 )
@@ -37,7 +38,7 @@ MOST_MEANS = 12  # combinations whose means are printed; those of more are in su
 @click.option("--json", "as_json", is_flag=True, help="Write the summary as JSON to standard output.")
 @force_option
 def command(
-    study: Path,
+    study: str,
     output: Path | None,
     jobs: int | None,
     scheduler: str | None,
@@ -59,9 +60,9 @@ def command(
 
     if scheduler and jobs:
         raise click.UsageError("--jobs is for this machine; on a cluster its workers decide")
-    asked = read_study(study)
+    asked = read_study(Path(study))
     every = list(cases(asked))
-    folder = output or study.with_suffix(".runs")
+    folder = output or Path(study).with_suffix(".runs")
     with Journal(folder, asked.hash, force=force) as journal:
         todo = [case for case in every if case.number not in journal.rows]
         limits = dict(asked.limits)

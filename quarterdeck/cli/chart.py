@@ -2,12 +2,13 @@
 
 import click
 
+from quarterdeck.cli.files import takes
 from quarterdeck.cli.output import emit, force_option, output_option
 from quarterdeck.cli.parameters import Numbers, Real
 
 
 @click.command(short_help="ENC cells as a site.")
-@click.argument("cells", nargs=-1, required=True)
+@takes("cells", pipe=False, nargs=-1, required=True)
 @click.option("--draught", type=Real(min=0), required=True, help="Metres that the vessels go down.")
 @click.option("--clearance", type=Real(min=0), default=0.5, show_default=True, help="Metres below the keel.")
 @click.option(

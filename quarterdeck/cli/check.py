@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING
 
 import click
 
+from quarterdeck.cli.files import takes
+
 if TYPE_CHECKING:
     from quarterdeck.geo.geojson import Document
 
 
 @click.command(short_help="Every problem of a site or a plan.")
-@click.argument("file")
+@takes("file")
 def command(file: str) -> int:
     """List every problem of FILE, a site or a PLAN, one a line.
 

@@ -5,14 +5,15 @@ from typing import Any
 
 import click
 
+from quarterdeck.cli.files import takes
 from quarterdeck.cli.output import force_option, terrain_option, tolerance_option
 from quarterdeck.cli.parameters import Moment, Real
 
 
 @click.command(short_help="Autopilot and ECDIS files, recording, pictures.")
-@click.argument("plan")
+@takes("plan")
 @click.option("--to", "formats", required=True, help="Formats parted by commas, such as qgc-wpl,png; or all.")
-@click.option("-o", "--out", default=".", show_default=True, help="The folder to write into.")
+@click.option("-o", "--out", type=click.Path(), default=".", show_default=True, help="The folder to write into.")
 @click.option("--autopilot", default="ardupilot", show_default=True, help="Whom mission files are for: ardupilot or px4.")
 @click.option("--altitude", default="relative", show_default=True, help="What heights count from: relative, terrain, amsl.")
 @click.option("--ground", type=Real(), help="Metres of the ground above mean sea level, for amsl.")

@@ -1,7 +1,5 @@
 """Where results and tables go: results to a file or standard output, tables and progress to standard error."""
 
-import hashlib
-import io
 import sys
 from pathlib import Path
 from typing import Any
@@ -11,30 +9,16 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from quarterdeck.cli.files import reads, writes
 from quarterdeck.cli.parameters import Real
-from quarterdeck.geo.files import read_bytes, refuse_existing, write_file
+from quarterdeck.geo.files import write_file
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.reason import Reason
 
-
-def not_there(ctx: click.Context, param: click.Parameter, output: Any) -> Any:  # noqa: ARG001
-    """Return an option's file, or refuse one that exists without --force: told before the work, not after it."""
-    if output and output != "-":
-        refuse_existing(Path(output), force=ctx.params["force"])
-    return output
-
-
-output_option = click.option(
-    "-o",
-    "--output",
-    default="-",
-    show_default=True,
-    callback=not_there,
-    help="The file to write; - is standard output.",
-)
+output_option = writes("-o", "--output", default="-", show_default=True, help="The file to write; - is standard output.")
 force_option = click.option("--force", is_flag=True, is_eager=True, help="Overwrite existing files.")
-terrain_option = click.option(
-    "--terrain", metavar="FILE", help="Elevation model (GeoTIFF, ESRI ASCII grid): what flies holds its height above it."
+terrain_option = reads(
+    "--terrain", help="Elevation model (GeoTIFF, ESRI ASCII grid): what flies holds its height above it."
 )
 tolerance_option = click.option("--tolerance", type=Real(min=0, min_open=True), default=5.0, show_default=True,
                                 help="With --terrain: metres above or below that height between waypoints.")  # fmt: skip
@@ -61,20 +45,6 @@ def emit(content: str | bytes, output: str, *, force: bool) -> None:
     else:
         sys.stdout.buffer.write(content)
     sys.stdout.flush()
-
-
-def put_back(file: str, data: bytes) -> str:
-    """Return `file`, its bytes put back where it is standard input, which gives them only once."""
-    if file == "-":
-        sys.stdin = io.TextIOWrapper(io.BytesIO(data), encoding="utf-8")
-    return file
-
-
-def digest(file: str) -> str:
-    """Return the SHA-256 of a file's bytes, which are put back where it is standard input. Raises InputError."""
-    data = read_bytes(file)
-    put_back(file, data)
-    return hashlib.sha256(data).hexdigest()
 
 
 def tell_compiling() -> None:

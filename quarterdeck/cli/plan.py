@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from quarterdeck.cli.files import takes
 from quarterdeck.cli.output import (
     emit,
     force_option,
@@ -33,7 +34,7 @@ OPTIONS = {
 
 
 @click.command(short_help="Cover an area.")
-@click.argument("site", default="-")
+@takes("site", default="-")
 @output_option
 @click.option("--method", type=Choice([*OPTIONS, *addon_names(METHODS)]),
               help="stc: spanning trees; lines: parallel lines (default where a vehicle has a sensor); "

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from quarterdeck.cli.files import reads, takes
 from quarterdeck.cli.output import (
     console,
     emit,
@@ -28,16 +29,16 @@ if TYPE_CHECKING:
 
 
 @click.command(short_help="From what has happened so far: losses, changes, additions, withdrawals.")
-@click.argument("plan")
+@takes("plan")
 @output_option
 @click.option("--at", "time", type=Real(min=0), help="Seconds since the mission's start; default: as far as the logs go.")
-@click.option("--track", "tracks", metavar="[VEHICLE=]FILE", multiple=True,
+@click.option("--track", "tracks", type=click.Path(), metavar="[VEHICLE=]FILE", multiple=True,
               help="A log of what really happened, as for `report`; repeatable. Without: all went as planned.")  # fmt: skip
 @click.option("--start", metavar="TIME", help="When the mission began, as 2026-06-01T12:00:00Z; default: by the logs.")
-@click.option("--state", metavar="REPORT", help="A report of `simulate` or `report` instead of logs.")
-@click.option("--changes", "changed", metavar="GEOJSON", help="All that is different, a feature a change: docs/replan.md.")
+@reads("--state", pipe=True, metavar="REPORT", help="A report of `simulate` or `report` instead of logs.")
+@reads("--changes", "changed", pipe=True, metavar="GEOJSON", help="What is different, a feature a change: docs/replan.md.")
 @click.option("--lost", default="", help="Ids of the vehicles that are lost, with commas; ID@SECONDS: since when.")
-@click.option("--add", metavar="SITE", help="GeoJSON of what is new: obstacles, areas, tasks, vehicles that join.")
+@reads("--add", pipe=True, metavar="SITE", help="GeoJSON of what is new: obstacles, areas, tasks, vehicles that join.")
 @click.option("--gone", default="", help="Ids of obstacles that are no more, with commas.")
 @click.option("--withdrawn", default="", help="Ids of areas and tasks that need not be done any more, with commas.")
 @click.option("--seed", type=click.IntRange(min=0), help="Seed of all that is random; default the plan's.")

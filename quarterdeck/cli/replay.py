@@ -4,18 +4,25 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Iterator
 from dataclasses import replace
+from hashlib import sha256
 from itertools import zip_longest
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from quarterdeck.cli.output import console, digest
+from quarterdeck.cli.files import reads, takes
+from quarterdeck.cli.output import console
 from quarterdeck.cli.parameters import Real
 from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.files import read_bytes
+from quarterdeck.geo.kinds import PLAN, REPORT, kind_of
 
 if TYPE_CHECKING:
+    from quarterdeck.geo.geojson import Document
     from quarterdeck.geo.scenario import Scenario
     from quarterdeck.mission.mission import Mission
 
@@ -25,29 +32,32 @@ SHOWN = 20  # differences that are printed; --json has all
 
 
 @click.command(short_help="Run a report or a plan again, and compare.")
-@click.argument("file")
-@click.option("--plan", help="The report's plan, where it does not lie where it lay.")
-@click.option("--site", help="The plan's site: it is planned again too, with its seed and parameters.")
+@takes("file")
+@reads("--plan", help="The report's plan, where it is not found.")
+@reads("--site", pipe=True, help="The plan's site: it is planned again too, with its seed and parameters.")
 @click.option("--within", type=Real(min=0), default=0.0, show_default=True,
               help="By what numbers may differ: a fraction, near 0 an amount; 0: to the last digit.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Write all differences as JSON to standard output.")
 def command(file: str, plan: str | None, site: str | None, within: float, as_json: bool) -> int:
-    """Run again what FILE came of, and print what differs: a report of `simulate`, or with --site a plan.
+    """Run again what FILE came of, and print what differs: a report of `simulate`, or with --site a PLAN.
 
-    Exit status 1 if anything does. Another version of Quarterdeck is told, and is no difference by itself.
+    A report's files are looked for where its command had them, from here and from the report's folder and those above it,
+    and beside the report; their hashes tell whether they are the same. Exit status 1 if anything differs. Another version
+    of Quarterdeck is told, and is no difference by itself.
     """
-    document = _read(file)
+    from quarterdeck.geo.geojson import Document, opened
+
     found: Differences = []
-    if document["type"] == "FeatureCollection":
+    read = _read(file)
+    if isinstance(read, Document):
         if site is None or plan is not None:
-            raise click.UsageError(f"{file} is a plan: give the site that it was made of by --site, and no --plan")
-        found += plan_again(document, file, site, within)
+            raise InputError(f"{file}: is a PLAN, not a report; to plan it again give its site by --site, and no --plan")
+        found += plan_again(read, site, within)
     else:
-        options, files = _recorded(document, file)
-        plan = plan or str(options.get("plan"))
+        options = _with_files(read, file, plan)
         if site is not None:
-            found += plan_again(_read(plan), plan, site, within)
-        found += report_again(document, options | {"plan": plan}, files, within)
+            found += plan_again(opened(str(options.get("plan"))), site, within)
+        found += report_again(read, options, within)
     if as_json:
         click.echo(json.dumps([{"where": where, "was": was, "is": now} for where, was, now in found], indent=1))
     screen = console()
@@ -60,36 +70,59 @@ def command(file: str, plan: str | None, site: str | None, within: float, as_jso
     return 0 if same else 1
 
 
-def _read(file: str) -> dict[str, Any]:
-    """Return a report or a plan as JSON. Raises InputError if it is neither."""
-    from quarterdeck.geo.files import read_bytes
-    from quarterdeck.geo.geojson import parse_json
+def _read(file: str) -> Document | dict[str, Any]:
+    """Return a PLAN, or a report as JSON. Raises InputError if it is neither."""
+    from quarterdeck.geo.geojson import Document, parse, parse_json
 
+    data = read_bytes(file)
+    kind = kind_of(data)
     try:
-        document = parse_json(read_bytes(file))
+        if kind == PLAN:
+            return Document(file, data, parse(data))
+        if kind == REPORT:
+            return dict(parse_json(data))
     except InputError as error:
         raise InputError(f"{file}: {error}") from None
-    if isinstance(document, dict) and document.get("type") in ("quarterdeck-report", "FeatureCollection"):
-        return document
-    raise InputError(f"{file}: is neither a report of `quarterdeck simulate` nor a plan")
+    raise InputError(f"{file}: is {kind or 'neither a report of `quarterdeck simulate` nor a PLAN'}")
 
 
-def _recorded(report: dict[str, Any], file: str) -> tuple[dict[str, Any], dict[str, str]]:
-    """Return the options of the command that a report came of, and the hashes of its files."""
+def _with_files(report: dict[str, Any], file: str, plan: str | None) -> dict[str, Any]:
+    """Return the options of the command that a report came of, its files where they lie now.
+
+    Raises InputError if the report tells no command, or one of the files is not found as it was.
+    """
     command = report.get("command")
-    parts = [command.get(name) for name in ("options", "files")] if isinstance(command, dict) else [None]
-    if not all(isinstance(part, dict) for part in parts):
+    options, files = (command.get(name) for name in ("options", "files")) if isinstance(command, dict) else (None, None)
+    if not isinstance(options, dict) or not isinstance(files, dict):
         raise InputError(f"{file}: does not tell the command that it came of; only those of `quarterdeck simulate` do")
-    return parts[0], parts[1]  # type: ignore[return-value]
+    home = Path(file).resolve().parent
+    options |= {"plan": plan} if plan is not None else {}
+    found = {name: _found(name, str(options.get(name)), was, home, plan) for name, was in files.items()}
+    return {**options, **found}
 
 
-def report_again(report: dict[str, Any], options: dict[str, Any], files: dict[str, str], within: float) -> Differences:
-    """Simulate with a report's options and return what differs. Raises InputError if a file is not the one it was."""
+def _found(name: str, lay: str, was: str, home: Path, plan: str | None) -> str:
+    """Return the path of a report's file, one with the same SHA-256, by where it lay and the folder of the report."""
+    advice = "give it by --plan" if name == "plan" else "put it beside the report"
+    if name == "plan" and plan is not None:
+        places = [Path(plan)]
+    elif lay == "-":
+        raise InputError(f"the report's {name} came by standard input; {advice}")
+    else:
+        places = [Path(lay), *(folder / lay for folder in (home, *home.parents)), home / Path(lay).name]
+    there = [place for place in places if os.path.isfile(place)]  # noqa: PTH113 - any name, however long
+    for place in there:
+        if sha256(read_bytes(place)).hexdigest() == was:
+            return str(place)
+    if there:
+        raise InputError(f"{there[0]}: is not the {name} that the report was made with (another SHA-256); {advice}")
+    raise InputError(f"{lay}: the report's {name} is not there, from here or from {home}; {advice}")
+
+
+def report_again(report: dict[str, Any], options: dict[str, Any], within: float) -> Differences:
+    """Simulate with a report's options and return what differs. Raises InputError if they cannot be used."""
     from quarterdeck.cli import simulate
 
-    for name, was in files.items():
-        if digest(str(options.get(name))) != was:
-            raise InputError(f"{options[name]}: is not the {name} that the report was made with (another SHA-256)")
     context = click.Context(simulate.command)
     try:
         given = {
@@ -105,13 +138,13 @@ def report_again(report: dict[str, Any], options: dict[str, Any], files: dict[st
     return [d for d in found if not (within and d[0] == "trace_hash")]
 
 
-def plan_again(document: dict[str, Any], file: str, site: str, within: float) -> Differences:
+def plan_again(plan: Document, site: str, within: float) -> Differences:
     """Plan a site again as a plan's header tells, and return what differs, by feature."""
     from quarterdeck.geo.reader import read_scenario
     from quarterdeck.mission.planfile import plan_text, read_plan
 
-    made = remade(read_plan(file), read_scenario(site), file, site)
-    return list(differences(_features(document), _features(json.loads(plan_text(made))), within))
+    made = remade(read_plan(plan), read_scenario(site), plan.name, site)
+    return list(differences(_features(plan.content), _features(json.loads(plan_text(made))), within))
 
 
 def remade(plan: Mission, scenario: Scenario, file: str, site: str) -> Mission:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from quarterdeck.cli.output import console, emit, force_option, not_there, print_reason
+from quarterdeck.cli.files import takes, writes
+from quarterdeck.cli.output import console, emit, force_option, print_reason
 from quarterdeck.cli.simulate import Limit
 from quarterdeck.cli.verdict import print_report
 
@@ -16,16 +17,14 @@ if TYPE_CHECKING:
 
 
 @click.command(short_help="Measure a real mission from its logs.")
-@click.argument("plan")
-@click.option("--track", "tracks", metavar="[VEHICLE=]FILE", multiple=True, required=True,
+@takes("plan")
+@click.option("--track", "tracks", type=click.Path(), metavar="[VEHICLE=]FILE", multiple=True, required=True,
               help="A log: .bin, .tlog, .gpx, .csv, or a trace of simulate; repeatable. See docs/logs.md.")  # fmt: skip
 @click.option("--start", metavar="TIME", help="When the mission began, such as 2026-06-01T12:00:00Z; default: by the logs.")
-@click.option("--report", metavar="FILE", callback=not_there, help="Write the report as JSON.")
-@click.option(
-    "--gaps", metavar="FILE", callback=not_there, help="Write what was left uncovered as a site to plan (GeoJSON)."
-)
-@click.option("--rrd", metavar="FILE", callback=not_there, help="Record the mission for rerun.")
-@click.option("--picture", metavar="FILE", callback=not_there, help="Draw plan, tracks and misses as a PNG.")
+@writes("--report", help="Write the report as JSON.")
+@writes("--gaps", help="Write what was left uncovered as a site to plan (GeoJSON).")
+@writes("--rrd", help="Record the mission for rerun.")
+@writes("--picture", help="Draw plan, tracks and misses as a PNG.")
 @click.option(
     "--limit", "limits", type=Limit(), multiple=True, help="A limit of the verdict; repeatable. See docs/simulation.md."
 )

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from quarterdeck.cli.files import reads, takes, writes
 from quarterdeck.cli.output import (
     console,
-    digest,
     emit,
     force_option,
     minutes,
-    not_there,
     seed_option,
     tell_compiling,
     time_limit_option,
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from quarterdeck.physics.simulate import Run
 
 
-FILES = ("plan", "unmapped", "world", "terrain")  # the options that are files to read
+DOCUMENTS = ("plan", "unmapped", "world")  # the options that are GeoJSON to read; --terrain is a file too
 
 
 class Vector(click.ParamType):
@@ -67,17 +67,13 @@ class Limit(click.ParamType):
 
 
 @click.command(short_help="Execute a plan in PyBullet; report and verdict.")
-@click.argument("plan")
-@click.option("--report", metavar="FILE", callback=not_there, help="Write the report as JSON.")
-@click.option("--rrd", metavar="FILE", callback=not_there, help="Record the run for rerun.")
-@click.option("--picture", metavar="FILE", callback=not_there, help="Draw plan, tracks and misses as a PNG.")
-@click.option(
-    "--snapshots", metavar="FILE", callback=not_there, help="Draw the field of a triage plan at telling moments as PNG."
-)
-@click.option(
-    "--casualties", metavar="FILE", callback=not_there, help="Write what became of a triage plan's casualties, GeoJSON."
-)
-@click.option("--trace", metavar="FILE", callback=not_there, help="Write every sample of the run (NPZ).")
+@takes("plan")
+@writes("--report", help="Write the report as JSON.")
+@writes("--rrd", help="Record the run for rerun.")
+@writes("--picture", help="Draw plan, tracks and misses as a PNG.")
+@writes("--snapshots", help="Draw the field of a triage plan at telling moments as PNG.")
+@writes("--casualties", help="Write what became of a triage plan's casualties, GeoJSON.")
+@writes("--trace", help="Write every sample of the run (NPZ).")
 @click.option("--current", type=Vector(), default="0,0", show_default=True, help="Water's motion, m/s east and north.")
 @click.option("--wind", type=Vector(), default="0,0", show_default=True, help="Mean wind, m/s towards east and north.")
 @click.option("--gusts", type=Real(min=0), default=0.0, show_default=True, help="Standard deviation of gusts, m/s.")
@@ -101,15 +97,15 @@ class Limit(click.ParamType):
     show_default=True,
     help="The potential field of robots with lidar: scaled by the goal's distance, or the inspection paper's.",
 )
-@click.option("--unmapped", metavar="SITE", help="GeoJSON with obstacles that are there, but that the plan does not know.")
-@click.option("--world", metavar="SITE", help="GeoJSON with the obstacles that are there, in place of the plan's.")
-@click.option(
-    "--map", "map_file", metavar="FILE.yaml", callback=not_there,
+@reads("--unmapped", pipe=True, metavar="SITE", help="GeoJSON with obstacles that are there, and not in the plan.")
+@reads("--world", pipe=True, metavar="SITE", help="GeoJSON with the obstacles that are there, in place of the plan's.")
+@writes(
+    "--map",
+    "map_file",
+    metavar="FILE.yaml",
     help="Write the map that the robots draw by lidar, for map_server, .yaml and .pgm (implies --lidar).",
-)  # fmt: skip
-@click.option(
-    "--terrain", metavar="FILE", help="Ground that is not flat: GeoTIFF, ESRI ASCII grid or NPZ. See docs/simulation.md."
 )
+@reads("--terrain", help="Ground that is not flat: GeoTIFF, ESRI ASCII grid or NPZ. See docs/simulation.md.")
 @seed_option
 @click.option(
     "--limit", "limits", type=Limit(), multiple=True, help="A limit of the verdict; repeatable. See docs/simulation.md."
@@ -205,6 +201,8 @@ def execute(
     Raises InputError if it is to tell of `casualties` and is no plan of triage.
     """
     options = {name: value for name, value in locals().items() if name != "casualties"}
+    from quarterdeck.geo.files import read_bytes
+    from quarterdeck.geo.geojson import opened
     from quarterdeck.geo.reader import read_obstacles
     from quarterdeck.geo.terrain import read_terrain
     from quarterdeck.mission.planfile import read_plan
@@ -213,13 +211,15 @@ def execute(
     from quarterdeck.physics.sensing import Sensing
     from quarterdeck.physics.simulate import simulate
 
-    files = {name: digest(options[name]) for name in FILES if options[name]}
-    mission = read_plan(plan)
+    given = {name: opened(options[name]) for name in DOCUMENTS if options[name]}
+    data = {name: document.data for name, document in given.items()} | ({"terrain": read_bytes(terrain)} if terrain else {})
+    files = {name: sha256(content).hexdigest() for name, content in data.items()}
+    mission = read_plan(given["plan"])
     if casualties and mission.method != METHOD:
         raise InputError("--snapshots and --casualties are for plans of triage; use --picture and --report")
-    strange = read_obstacles(unmapped, mission.frame) if unmapped else ()
+    strange = read_obstacles(given["unmapped"], mission.frame) if unmapped else ()
     ground = read_terrain(terrain, mission.frame, mission.site.operating.bounds) if terrain else None
-    there = read_obstacles(world, mission.frame) if world else None
+    there = read_obstacles(given["world"], mission.frame) if world else None
     mapping = map_file is not None
     sensing = Sensing(gnss, lidar or mapping, amcl, strange, there, mapping, field)
     with _progress(mission.name) as progress:

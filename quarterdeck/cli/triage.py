@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from quarterdeck.cli.files import takes, writes
 from quarterdeck.cli.output import (
     console,
     emit,
     force_option,
-    not_there,
     output_option,
     print_reason,
     seed_option,
@@ -74,18 +74,18 @@ _FROM_ZERO = Real(min=0, max=1e9)
 
 
 @click.command(short_help="Search, relay, treat; the four methods.")
-@click.argument("site", required=False)
+@takes("site", required=False)
 @click.option("--method", type=Choice(METHODS), default="relay", show_default=True, help="Who tells the medic, how.")
 @click.option("--compare", is_flag=True, help="Run all four methods and print their figures side by side.")
 @output_option
-@click.option("--casualty-csv", metavar="FILE", callback=not_there, help="Write a row a casualty.")
-@click.option("--log-csv", metavar="FILE", callback=not_there, help="Write a row an event.")
-@click.option("--cot", metavar="FILE", callback=not_there, help="Write Cursor-on-Target events; needs --start.")
+@writes("--casualty-csv", help="Write a row a casualty.")
+@writes("--log-csv", help="Write a row an event.")
+@writes("--cot", help="Write Cursor-on-Target events; needs --start.")
 @click.option("--start", metavar="TIME", help="When the mission began, such as 2026-05-01T09:00:00Z, for --cot.")
-@click.option("--timeline", metavar="FILE", callback=not_there, help="Draw the timeline as PNG.")
-@click.option("--map", "field_map", metavar="FILE", callback=not_there, help="Draw the field with everybody's way as PNG.")
-@click.option("--snapshots", metavar="FILE", callback=not_there, help="Draw the field at telling moments as PNG (Fig. 6).")
-@click.option("--plan", metavar="FILE", callback=not_there, help="Write the PLAN that `simulate` executes in PyBullet.")
+@writes("--timeline", help="Draw the timeline as PNG.")
+@writes("--map", "field_map", help="Draw the field with everybody's way as PNG.")
+@writes("--snapshots", help="Draw the field at telling moments as PNG (Fig. 6).")
+@writes("--plan", help="Write the PLAN that `simulate` executes in PyBullet.")
 @click.option("--fail", "fails", type=AtTime(), multiple=True, help="A robot, or a medic's device, fails; repeatable.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on standard error instead of a table.")
 @click.option(

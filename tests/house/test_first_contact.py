@@ -60,7 +60,7 @@ def test_version_tells_what_results_depend_on(capsys):
         (["plan", "--spacng", "3"], "--spacing"),
         (["plan", "--method", "lins"], "'lines'"),
         (["init", "harbor"], "'harbour'"),
-        (["simulate", "x", "--gnss", "rtx"], "'rtk'"),
+        (["simulate", "-", "--gnss", "rtx"], "'rtk'"),
     ],
 )
 def test_the_nearest_is_suggested(capsys, arguments, nearest):

@@ -65,10 +65,42 @@ def test_no_overwriting_without_force(tmp_path, capsys):
 
 
 def test_an_existing_file_is_refused_before_the_work(tmp_path, capsys):
-    """The output is looked at first: even the site that is not there comes second, and --force may stand anywhere."""
+    """The output is looked at before the site is read, but after whether it is there; --force may stand anywhere."""
     (tmp_path / "plan.geojson").write_text("mine")
-    assert "--force" in refused(capsys, "plan", "none.geojson", "-o", tmp_path / "plan.geojson")
-    assert "none.geojson" in refused(capsys, "plan", "none.geojson", "-o", tmp_path / "plan.geojson", "--force")
+    (tmp_path / "site.geojson").write_text("no site")
+    output = ("-o", tmp_path / "plan.geojson")
+    assert "none.geojson" in refused(capsys, "plan", *output, "none.geojson")
+    assert "--force" in refused(capsys, "plan", tmp_path / "site.geojson", *output)
+    assert "not JSON" in refused(capsys, "plan", tmp_path / "site.geojson", *output, "--force")
+
+
+def test_a_missing_file_of_an_option_comes_first_too(tmp_path, capsys):
+    """What is to be read is looked for before what would be overwritten, wherever it stands."""
+    site = DATA / "dalian_harbour.geojson"
+    (tmp_path / "plan.geojson").write_text("mine")
+    assert "nowhere.tif" in refused(capsys, "plan", site, "-o", tmp_path / "plan.geojson", "--terrain", "nowhere.tif")
+
+
+def test_a_file_of_another_verb_is_told_what_it_is(tmp_path, capsys):
+    """Whatever is given where something else is wanted: what it is, and which verbs take it."""
+    plan, study, model = (
+        tmp_path / "plan.geojson",
+        DATA.parent / "examples" / "triage.toml",
+        DATA / "vehicles" / "otter.toml",
+    )
+    with pytest.raises(SystemExit):
+        main(["plan", str(DATA / "dalian_harbour.geojson"), "--spacing", "80", "-o", str(plan)])
+    capsys.readouterr()
+    assert "is a PLAN; `check`, `simulate`" in refused(capsys, "plan", plan)
+    assert "is a PLAN; `check`, `simulate`" in refused(capsys, "campaign", plan)
+    assert "is a PLAN, not a report" in refused(capsys, "replay", plan)
+    assert "not a PLAN, but a site; `check`, `plan`" in refused(capsys, "simulate", DATA / "dalian_harbour.geojson")
+    assert "is a site; `check`, `plan`" in refused(capsys, "replay", DATA / "dalian_harbour.geojson")
+    assert "is a study; `campaign` takes it" in refused(capsys, "check", study)
+    assert "is a vehicle model" in refused(capsys, "plan", model)
+    assert "is an ENC cell; `chart`" in refused(capsys, "plan", DATA / "sample_chart.000")
+    assert "is a PLAN; `check`" in refused(capsys, "report", plan, "--track", plan)
+    assert "is a PLAN; `check`" in refused(capsys, "replan", plan, "--state", plan)
 
 
 def test_a_name_too_long_for_a_file(tmp_path, capsys):

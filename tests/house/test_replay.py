@@ -71,6 +71,25 @@ def test_a_report_is_had_again(report: Path, capsys) -> None:
     assert command["options"]["faults"] == ["random:1"]
 
 
+@pytest.mark.parametrize("where", [".", "elsewhere"])
+def test_a_report_finds_its_files_from_anywhere(where: str, tmp_path: Path, monkeypatch, capsys) -> None:
+    """Files that the command named from its folder are found from any other, by the report's; another's are not taken."""
+    pytest.importorskip("pybullet", reason="PyBullet has wheels for Linux and CPython 3.11 only")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "elsewhere" / "out").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path)
+    call("plan", DATA / "first_site.geojson", "--placement", "none", "-o", "out/plan.geojson")
+    call("simulate", "out/plan.geojson", "--report", "out/report.json")
+    (tmp_path / "elsewhere" / "out" / "plan.geojson").write_text("another", encoding="utf-8")
+    monkeypatch.chdir(tmp_path / where)
+    assert call("replay", tmp_path / "out" / "report.json") == 0
+    (tmp_path / "out" / "plan.geojson").unlink()
+    assert call("replay", tmp_path / "out" / "report.json") == 2
+    told = capsys.readouterr().err.splitlines()[-1]
+    assert ("another SHA-256" if where == "elsewhere" else "is not there") in told
+    assert "--plan" in told
+
+
 def test_what_differs_is_told(report: Path, tmp_path: Path, capsys) -> None:
     """A figure that was changed by hand is found, with both values; another version alone is told and no failure."""
     document = json.loads(report.read_text(encoding="utf-8"))
