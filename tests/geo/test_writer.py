@@ -32,6 +32,8 @@ def test_a_written_site_reads_as_the_one_it_was(path: Path, tmp_path: Path) -> N
             b.share,
             b.can,
         )
+    for a, b in zip([*first.tasks, *first.casualties], [*second.tasks, *second.casualties], strict=True):
+        assert np.hypot(*np.subtract(a.position, b.position)) < 1e-3
     assert [(c.id, c.colour) for c in first.casualties] == [(c.id, c.colour) for c in second.casualties]
     assert [replace(t, position=(0.0, 0.0)) for t in first.tasks] == [replace(t, position=(0.0, 0.0)) for t in second.tasks]
     assert site_text(second) == site_text(first)
