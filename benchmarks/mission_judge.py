@@ -18,7 +18,6 @@ from quarterdeck.geo.scenario import Scenario
 from quarterdeck.mission.cover import roadmaps
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.routes import line_routes, survey_tracks
-from quarterdeck.mission.survey_recovery import LEFT_OUT
 from quarterdeck.mission.timing import RESERVE, shortfalls
 from quarterdeck.mission.triage.plan import METHOD
 from quarterdeck.physics.paths import LEGS
@@ -146,7 +145,7 @@ def _undriven(mission: Mission, run: Run, last: Mission) -> list[str]:
         places = places[cKDTree(driven).query(places)[0] > 0.5 * spacing]
     wrecks = shapely.union_all([o.polygon for o in last.site.obstacles if o.id.startswith("wreck")])
     far = max(v.clearance for v in mission.vehicles) + spacing
-    told = shapely.union_all([*last.layer(LEFT_OUT).geometries, *last.layer("undone").geometries])
+    told = shapely.union_all([*last.left_out, *last.layer("undone").geometries])
     excused = shapely.union(wrecks.buffer(far) if wrecks.area else wrecks, told.buffer(0.5 * spacing))
     shapely.prepare(excused)
     places = places[~shapely.contains_xy(excused, *places.T)]
@@ -202,15 +201,14 @@ def _pieces(watched: Any, last: Mission) -> Iterator[tuple[str, np.ndarray, floa
     there, and the only vehicle that may do it, if there is but one.
     """
     spacing = last.spacing or 0.0
-    for line in last.layer(LEFT_OUT).geometries:
+    for line in last.left_out:
         for way in (line, line.reverse()):
             piece = shapely.ops.substring(way, 0.0, 1.5 * spacing)
             if piece.length > spacing:
                 yield f"a line at {way.coords[0][0]:.1f}, {way.coords[0][1]:.1f}", np.array(piece.coords), 0.0, None
-    layer = last.layer("guards")
-    for place, told in zip(layer.geometries, layer.properties, strict=True):
-        if not told["seen"] and told["vehicle"] is None and last.layer("undone").geometries:
-            yield f"guard-{told['guard']}", _speck(place.x, place.y), 0.0, None
+    for i, guard in enumerate(last.guards):
+        if not guard.seen and guard.vehicle is None and last.layer("undone").geometries:
+            yield f"guard-{i}", _speck(guard.x, guard.y), 0.0, None
     left = last.figures.get("undone", ())
     for task in last.tasks:
         if task.id in left and all(a.task in watched.served for a in task.after):

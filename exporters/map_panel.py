@@ -8,6 +8,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from quarterdeck.geo.palette import SITE
+from quarterdeck.mission.layers import drawn
 from quarterdeck.mission.mission import Layer, Mission, Route
 from quarterdeck.physics.report import Report
 
@@ -104,7 +105,7 @@ def legend(panel: Axes, mission: Mission, *, run: bool = False, strange: bool = 
         handles.append(Patch(facecolor=STRANGE, edgecolor=STRANGE, label="obstacle that the plan did not know"))
     if mission.tasks:
         handles.append(Line2D([], [], **TASK, label="task"))
-    handles += [_key(layer) for layer in mission.layers if any("stroke" in p for p in layer.properties)]
+    handles += [_key(layer) for layer in drawn(mission) if any("stroke" in p for p in layer.properties)]
     if run:
         handles[0:2] = [
             Line2D([], [], color="#333333", linewidth=1.2, label="driven"),

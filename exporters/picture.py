@@ -16,6 +16,7 @@ from quarterdeck.exporters.map_panel import AREA, CONTACT, MISSED, OBSTACLE, STA
 from quarterdeck.exporters.places import file_stems, spacing_words
 from quarterdeck.geo.palette import CASUALTY, SITE, colours
 from quarterdeck.geo.scenario import Obstacle
+from quarterdeck.mission.layers import drawn
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.routes import survey_lines
 from quarterdeck.physics.report import Report
@@ -112,7 +113,7 @@ def _site(chart: Axes, mission: Mission, strange: Sequence[Obstacle]) -> None:
 
 def _layers(chart: Axes, mission: Mission, palette: list[str]) -> None:
     colour_of = {route.vehicle: colour for route, colour in zip(mission.routes, palette, strict=True)}
-    for layer in mission.layers:
+    for layer in drawn(mission):
         for geometry, properties in zip(layer.geometries, layer.properties, strict=True):
             colour = properties.get("stroke") or colour_of.get(properties.get("vehicle", ""), "#777777")
             if isinstance(geometry, shapely.Point | shapely.MultiPoint):

@@ -16,23 +16,20 @@ def unproved(mission: Mission) -> list[str]:
     """Return what is wrong with the coverage of a guards plan, a line each: stops that no route makes, and unseen area."""
     if mission.method != "guards":
         return []
-    layer = next((layer for layer in mission.layers if layer.name == "guards"), None)
-    if layer is None:
-        return ["the plan's guards are missing; plan it again"]
-    places = shapely.get_coordinates(layer.geometries).reshape(-1, 2)
+    places = np.array([(g.x, g.y) for g in mission.guards], dtype=float).reshape(-1, 2)
     stops = {w.task: (r.vehicle, w.x, w.y) for r in mission.routes for w in r.waypoints if w.task}
     problems, proved = [], []
-    for i, guard in enumerate(layer.properties):
-        vehicle, x, y = stops.get(f"guard-{guard['guard']}", (None, np.inf, np.inf))
-        if guard["seen"] or (vehicle == guard["vehicle"] and np.hypot(*(places[i] - (x, y))) < NEAR):
+    for i, guard in enumerate(mission.guards):
+        vehicle, x, y = stops.get(f"guard-{i}", (None, np.inf, np.inf))
+        if guard.seen or (vehicle == guard.vehicle and np.hypot(*(places[i] - (x, y))) < NEAR):
             proved.append(i)
-        elif guard["vehicle"] is not None:
-            problems.append(f"{guard['vehicle']}: does not pass guard-{guard['guard']}")
+        elif guard.vehicle is not None:
+            problems.append(f"{guard.vehicle}: does not pass guard-{i}")
     site = mission.site
     blocking = [o.polygon for o in site.obstacles if any(v.domain in o.blocks for v in mission.vehicles)]
     sight = as_multipolygon(shapely.union(site.area, site.operating).difference(shapely.union_all(blocking)))
     target = border_of(site.coverable) if mission.parameters.get("inspect") == "border" else site.coverable
-    ranges = np.array([layer.properties[i]["range"] for i in proved], dtype=float)
+    ranges = np.array([mission.guards[i].range for i in proved], dtype=float)
     rest = uncovered_by_shadows(target, sight, places[proved], ranges)
     gaps = as_multipolygon(rest.buffer(-ROUNDING).buffer(ROUNDING))
     if gaps.area > TOLERANCE * target.area and mission.feasible:

@@ -1,8 +1,7 @@
 """A guards mission from now on: what is left to see, shared out among whoever works, from where they are."""
 
-from collections.abc import Mapping
+from collections.abc import Collection
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import shapely
@@ -18,7 +17,7 @@ from quarterdeck.geo.triangulation import Triangulation, triangulate
 from quarterdeck.geo.visibility import visibility_polygons
 from quarterdeck.mission.guard_routes import Team, Tours, guard_route, shorter_tours
 from quarterdeck.mission.guards import enter, guard_ranks, guards_mission, vehicle_ranges
-from quarterdeck.mission.mission import Layer, Mission
+from quarterdeck.mission.mission import Guard, Mission
 from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.timing import shortfalls
 
@@ -42,7 +41,7 @@ def guards_from_now(
         whole = replace(whole, target=border_of(whole.target))
     mesh = triangulate(whole.sight)
     seen = _confirmed(mission, scenario, served)
-    target = _unseen(whole, mesh, seen)
+    target = _unseen(whole, mesh, seen.values())
     if target.area <= TOLERANCE * whole.target.area:
         target = shapely.MultiPolygon()
     space = replace(whole, target=target)
@@ -62,7 +61,7 @@ def guards_from_now(
         after,
         parameters=mission.parameters,
         seed=seed,
-        layers=(_with_seen(after.layers[0], seen), *after.layers[1:]),
+        guards=(*after.guards, *(replace(g, vehicle=None, turn=None, seen=True) for g in seen.values())),
         reasons=(*([Reason(told)] if lost > 0 else []), *after.reasons),
     )
 
@@ -71,67 +70,44 @@ def _same_needs(mission: Mission, scenario: Scenario, reach: float) -> bool:
     """Whether each guard that is left is needed, and no more are: the site is as it was, all of it was to be seen, by
     guards none of which was spare, and nobody sees less far.
     """
-    layer = mission.layer("guards")
     now, then = scenario.site, mission.site
     return (
         mission.feasible
         and mission.parameters.get("mode") != "paper"
         and now.obstacles == then.obstacles
         and [a.polygon for a in now.areas] == [a.polygon for a in then.areas]
-        and all(p["seen"] or p["vehicle"] is not None for p in layer.properties)
-        and all(p["range"] <= reach * (1 + 1e-9) for p in layer.properties)
+        and all(g.seen or g.vehicle is not None for g in mission.guards)
+        and all(g.range <= reach * (1 + 1e-9) for g in mission.guards)
     )
 
 
 def with_confirmed(mission: Mission, served: frozenset[str]) -> Mission:
-    """Return the mission with the guards of `served` stops marked as seen; any other mission as it is."""
-    if mission.method != "guards":
-        return mission
-
-    def told(layer: Layer) -> Layer:
-        if layer.name != "guards":
-            return layer
-        marked = tuple({**p, "seen": _done(p, served)} for p in layer.properties)
-        return replace(layer, properties=marked)
-
-    return replace(mission, layers=tuple(told(layer) for layer in mission.layers))
+    """Return the mission with the guards of `served` stops marked as seen."""
+    return replace(mission, guards=tuple(replace(g, seen=_done(i, g, served)) for i, g in enumerate(mission.guards)))
 
 
-def _confirmed(mission: Mission, scenario: Scenario, served: frozenset[str]) -> dict[int, tuple[shapely.Point, float]]:
-    """Return, by its place in the layer, where each guard is whose observation is confirmed, now or before, and its range.
+def _confirmed(mission: Mission, scenario: Scenario, served: frozenset[str]) -> dict[int, Guard]:
+    """Return the guards, by their number, whose observation is confirmed, now or before.
 
     One that an obstacle stood near that is gone does not count any more: it has not seen what the obstacle hid.
     """
-    layer = mission.layer("guards")
     gone = shapely.union_all([o.polygon for o in mission.site.obstacles if o not in scenario.site.obstacles])
     return {
-        i: (place, float(p["range"]))
-        for i, (place, p) in enumerate(zip(layer.geometries, layer.properties, strict=True))
-        if _done(p, served) and not place.dwithin(gone, float(p["range"]))
+        i: g
+        for i, g in enumerate(mission.guards)
+        if _done(i, g, served) and not shapely.dwithin(shapely.Point(g.x, g.y), gone, g.range)
     }
 
 
-def _done(guard: Mapping[str, Any], served: frozenset[str]) -> bool:
-    return bool(guard["seen"]) or f"guard-{guard['guard']}" in served
+def _done(number: int, guard: Guard, served: frozenset[str]) -> bool:
+    return guard.seen or f"guard-{number}" in served
 
 
-def _with_seen(layer: Layer, seen: Mapping[int, tuple[shapely.Point, float]]) -> Layer:
-    """Return the guards' layer with those that are done, for whoever replans next."""
-    done = list(seen.values())
-    first = len(layer.geometries)
-    told = [
-        {"guard": first + i, "range": reach, "vehicle": None, "turn": None, "seen": True}
-        for i, (_, reach) in enumerate(done)
-    ]
-    return replace(layer, geometries=(*layer.geometries, *(p for p, _ in done)), properties=(*layer.properties, *told))
-
-
-def _unseen(space: Space, mesh: Triangulation, seen: Mapping[int, tuple[shapely.Point, float]]) -> shapely.MultiPolygon:
+def _unseen(space: Space, mesh: Triangulation, seen: Collection[Guard]) -> shapely.MultiPolygon:
     """Return the target less what confirmed observations have seen."""
-    done = list(seen.values())
-    if not done:
+    if not seen:
         return space.target
-    views = visibility_polygons(mesh, shapely.get_coordinates([p for p, _ in done]), np.array([r for _, r in done]))
+    views = visibility_polygons(mesh, _places(seen), np.array([g.range for g in seen]))
     return as_multipolygon(space.target.difference(shapely.union_all(views)))
 
 
@@ -140,21 +116,24 @@ def _left(
     space: Space,
     mesh: Triangulation,
     team: Team,
-    seen: Mapping[int, tuple[shapely.Point, float]],
+    seen: Collection[int],
     *,
     all_needed: bool,
 ) -> tuple[np.ndarray, list[str | None]]:
     """Return the guards that are still needed, and the vehicle that was to pass each; in the order of the plan's tours."""
-    layer = mission.layer("guards")
-    places = shapely.get_coordinates(layer.geometries)
+    places = _places(mission.guards)
     inside = shapely.contains_xy(space.reach, places[:, 0], places[:, 1])
-    turns = [(p["turn"] is None, p["turn"] or 0, i) for i, p in enumerate(layer.properties)]
+    turns = [(g.turn is None, g.turn or 0, i) for i, g in enumerate(mission.guards)]
     order = [i for _, _, i in sorted(turns) if inside[i] and i not in seen]
     kept = order
     if order and not all_needed:
         views = visibility_polygons(mesh, places[order], float(team.ranges.min()))
         kept = [i for i, drop in zip(order, needless(space.target, views), strict=True) if not drop]
-    return places[kept].reshape(-1, 2), [layer.properties[i]["vehicle"] for i in kept]
+    return places[kept].reshape(-1, 2), [mission.guards[i].vehicle for i in kept]
+
+
+def _places(guards: Collection[Guard]) -> np.ndarray:
+    return np.array([(g.x, g.y) for g in guards], dtype=float).reshape(-1, 2)
 
 
 def _shared(net: Network, owners: list[str | None], mission: Mission, team: Team) -> tuple[tuple[int, ...], ...]:

@@ -13,7 +13,7 @@ from quarterdeck.coverage.network import Network, network
 from quarterdeck.geo.geodesics import Geodesics, geodesics
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.guard_tours import improve_tours, makespan_bound, tour_times
-from quarterdeck.mission.mission import Layer, Leg, Route
+from quarterdeck.mission.mission import Guard, Layer, Leg, Route
 from quarterdeck.mission.timing import timed_route
 
 
@@ -163,24 +163,23 @@ def guard_route(vehicle: Vehicle, tours: Tours, robot: int) -> Route:
     return timed_route(vehicle, np.array(points)[used], [legs[i] for i in used], tasks=[tasks[i] for i in used])
 
 
-def guard_layers(tours: Tours, team: Team) -> tuple[Layer, ...]:
-    """Return what is drawn beside the routes: guards, triangulation, reduced graph, trees and tours."""
-    net, names = tours.network, [v.id for v in team.vehicles]
+def guards_of(tours: Tours, team: Team) -> tuple[Guard, ...]:
+    """Return the guards with who passes them, and when."""
+    names, owners = [v.id for v in team.vehicles], tours.owners.tolist()
     turns = {guard: turn for order in tours.order for turn, guard in enumerate(order)}
-    guards = [
-        {
-            "guard": guard,
-            "range": float(team.ranges[owner] if owner >= 0 else team.ranges.min()),
-            "vehicle": names[owner] if owner >= 0 else None,
-            "turn": turns.get(guard),
-            "seen": False,
-        }
-        for guard, owner in enumerate(tours.owners.tolist())
-    ]
+    ranges = [float(team.ranges[owner] if owner >= 0 else team.ranges.min()) for owner in owners]
+    return tuple(
+        Guard(x, y, ranges[i], names[owners[i]] if owners[i] >= 0 else None, turns.get(i))
+        for i, (x, y) in enumerate(tours.guards.tolist())
+    )
+
+
+def guard_layers(tours: Tours, team: Team) -> tuple[Layer, ...]:
+    """Return what is drawn beside the routes and guards: triangulation, reduced graph, trees and tours."""
+    net, names = tours.network, [v.id for v in team.vehicles]
     trees = [net.forest.edges(robot) for robot in range(len(names))]
     grown = [robot for robot, edges in enumerate(trees) if len(edges)]
     return (
-        Layer("guards", tuple(shapely.points(tours.guards)), tuple(guards)),
         Layer("triangulation", (_lines(net.cdt.points, net.cdt.edges),), ({"stroke": "#cccccc", "stroke-width": 1},)),
         Layer("reduced graph", (_lines(net.cdt.points, net.reduced.edges),), ({"weight": net.reduced.weight},)),
         Layer(

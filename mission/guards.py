@@ -17,7 +17,7 @@ from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Scenario, Vehicle, as_multipolygon
 from quarterdeck.geo.triangulation import Triangulation, triangulate
 from quarterdeck.geo.visibility import visibility_polygons
-from quarterdeck.mission.guard_routes import Team, Tours, guard_layers, guard_route, paper_tours, shorter_tours
+from quarterdeck.mission.guard_routes import Team, Tours, guard_layers, guard_route, guards_of, paper_tours, shorter_tours
 from quarterdeck.mission.mission import Mission, undone_layer
 from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.timing import shortfalls
@@ -101,6 +101,7 @@ def guards_mission(
         figures=figures,
         bounds={"makespan": tours.bound},
         reasons=(*reasons, *short),
+        guards=guards_of(tours, team),
         layers=(*guard_layers(tours, team), *((undone_layer([(rest, "unseen")]),) if rest.area > 0 else ())),
         input_hash=scenario.input_hash,
     )

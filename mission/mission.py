@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
+from shapely import LineString
 
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.scenario import Casualty, Site, Task, Vehicle
@@ -69,6 +70,21 @@ def unbroken(points: np.ndarray, chosen: np.ndarray) -> list[np.ndarray]:
 
 
 @dataclass(frozen=True, slots=True)
+class Guard:
+    """A place in metres from which all within `range` metres and in sight is seen. By their order a mission's guards are
+    the tasks `guard-0`, `guard-1`, ... of its routes: `vehicle` passes it as the one after `turn` others; None for a spare
+    one, for which robots of longer range see. `seen`: that is done.
+    """
+
+    x: float
+    y: float
+    range: float
+    vehicle: str | None = None
+    turn: int | None = None
+    seen: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Layer:
     """Something to draw beside the routes, such as a division, guards or trees: shapely `geometries` in metres.
 
@@ -93,9 +109,9 @@ class Mission:
 
     `method` and `parameters` say how it was made, `figures` what it comes to, `bounds` what nothing could beat. `reasons`
     say, one line each, why it is infeasible; it is feasible when there are none. `spacing` is the track spacing in metres
-    (None where nothing is covered by swaths). `layers` are for the eye; those of guards, and of what was surveyed or left
-    out, are what replanning starts from. `lost` are vehicles that were given up, as they were then: where they were last,
-    with the energy that they had.
+    (None where nothing is covered by swaths). `layers` are for the eye. The `guards` of a plan of guards, lines that were
+    `surveyed` before it began, and survey lines `left_out` because nobody could do them, are what replanning starts from.
+    `lost` are vehicles that were given up, as they were then: where they were last, with the energy that they had.
     """
 
     name: str
@@ -113,6 +129,9 @@ class Mission:
     bounds: Mapping[str, Any] = field(default_factory=dict)
     reasons: tuple[Reason, ...] = ()
     layers: tuple[Layer, ...] = ()
+    guards: tuple[Guard, ...] = ()
+    surveyed: tuple[LineString, ...] = ()
+    left_out: tuple[LineString, ...] = ()
     input_hash: str = ""
     version: str = ""
     lost: tuple[Vehicle, ...] = ()

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
-from shapely import MultiPolygon, Point, Polygon, get_coordinates, make_valid, set_coordinates
+from shapely import MultiPolygon, Polygon, get_coordinates, make_valid, set_coordinates
 from shapely.errors import ShapelyError
 from shapely.geometry import shape as from_geojson
 
@@ -26,7 +26,8 @@ from quarterdeck.geo.properties import PROPERTIES, property_problems
 from quarterdeck.geo.reader import MAX_RADIUS
 from quarterdeck.geo.scenario import Area, Casualty, Obstacle, Precedence, Sensor, Site, Task, Vehicle, as_multipolygon
 from quarterdeck.geo.typed import fits, wrong_field
-from quarterdeck.mission.mission import Layer, Leg, Mission, Route, Waypoint
+from quarterdeck.mission.layers import drawn, undrawn
+from quarterdeck.mission.mission import Leg, Mission, Route, Waypoint
 from quarterdeck.mission.reason import HEADS, Reason, reason_of
 
 FORMAT = 1
@@ -37,7 +38,6 @@ PARAMETERS: dict[str, Any] = {  # those that later steps read
     "inspect": Literal["area", "border"],
     "range": float | None,
 }
-GUARD = {"guard": int, "turn": int | None, "vehicle": str | None, "range": float, "seen": bool}
 LEGS = set(get_args(Leg))
 LISTS = ("leg", "speed", "hold", "time", "task", "ground")  # of a route's waypoints, in the order of its positions
 
@@ -118,7 +118,7 @@ VEHICLE_FIGURES = ("share", "speed", "turn_radius", "clearance", "endurance", "b
 def _layers(mission: Mission) -> list[dict[str, Any]]:
     return [
         feature("layer", geometry(mission.frame, shape), layer=layer.name, **_plain(properties))
-        for layer in mission.layers
+        for layer in drawn(mission)
         for shape, properties in zip(layer.geometries, layer.properties, strict=True)
     ]
 
@@ -233,7 +233,7 @@ def _mission(name: str, header: dict[str, Any], features: list[dict[str, Any]]) 
         figures=header["figures"],
         bounds=header["bounds"],
         reasons=_reasons(header),
-        layers=tuple(Layer(n, tuple(g for g, _ in items), tuple(p for _, p in items)) for n, items in layers.items()),
+        **undrawn(layers),
         input_hash=header["input_hash"],
         version=header["version"],
         lost=tuple(_vehicle(f, frame) for f in of("lost")),
@@ -266,13 +266,9 @@ def _check_types(mission: Mission) -> None:
     known = {None, *(task.id for task in mission.tasks)}
     if mission.method == "assign" and any(w.task not in known for r in mission.routes for w in r.waypoints):
         raise ValueError("a route has a task that is not among its tasks")
-    guards = [layer for layer in mission.layers if layer.name == "guards"]
-    if mission.method == "guards" and len(guards) != 1:
-        raise ValueError("its guards are missing")
-    for layer in guards:
-        places = all(isinstance(g, Point) and not g.is_empty for g in layer.geometries)
-        if not places or not all(fits(dict(p), GUARD) for p in layer.properties):
-            raise TypeError("a guard is not what it must be")
+    known = {None, *(f"guard-{i}" for i in range(len(mission.guards)))}
+    if mission.method == "guards" and any(w.task not in known for r in mission.routes for w in r.waypoints):
+        raise ValueError("a route has a guard that is not among its guards")
 
 
 def _check_properties(features: list[dict[str, Any]]) -> None:

@@ -7,10 +7,8 @@ import numpy as np
 from shapely import LineString
 
 from quarterdeck.geo.errors import InputError
-from quarterdeck.mission.mission import Layer, Mission, Route, unbroken
+from quarterdeck.mission.mission import Mission, Route, unbroken
 from quarterdeck.mission.timing import RESERVE
-
-SURVEYED = "surveyed"  # the layer of what was surveyed before a plan began
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,12 +74,9 @@ def _place(route: Route, time: float) -> tuple[int, tuple[float, float, float]]:
     return reached, (float(x), float(y), float(z))
 
 
-def with_surveyed(mission: Mission, tracks: Sequence[np.ndarray]) -> Layer:
-    """Return the layer `surveyed`: the (n, 2) lines that were surveyed before this plan began, by earlier plans too."""
-    lines = {
-        line.wkb: line for line in (*mission.layer(SURVEYED).geometries, *(LineString(t) for t in tracks if len(t) > 1))
-    }
-    return Layer(SURVEYED, tuple(lines.values()), tuple({"stroke": "#999999", "stroke-width": 1} for _ in lines))
+def with_surveyed(mission: Mission, tracks: Sequence[np.ndarray]) -> tuple[LineString, ...]:
+    """Return what was surveyed before a mission began, by earlier plans too, with (n, 2) tracks that were driven since."""
+    return tuple({line.wkb: line for line in (*mission.surveyed, *(LineString(t) for t in tracks if len(t) > 1))}.values())
 
 
 def surveyed(route: Route, reached: int, position: tuple[float, float, float]) -> list[np.ndarray]:
@@ -93,6 +88,9 @@ def surveyed(route: Route, reached: int, position: tuple[float, float, float]) -
     return unbroken(points, survey)
 
 
-def energy_left(battery: float, used: float) -> float:
-    """Return the watt-hours that planning may count on such that `RESERVE` of the whole battery is still kept."""
-    return max(0.0, battery - used / (1 - RESERVE))
+def budget_left(whole: float, used: float) -> float:
+    """Return the budget, watt-hours or seconds, of a vehicle that has used a part of it.
+
+    It is such that a plan that keeps `RESERVE` of it keeps as much as one that keeps `RESERVE` of the `whole`.
+    """
+    return max(0.0, whole - used / (1 - RESERVE))

@@ -28,7 +28,6 @@ from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.replan import replan
 from quarterdeck.mission.triage.plan import METHOD
 
-FOUND = "found-"  # how the ids begin of what robots have found
 BERTH = 4.0  # lengths from its end: so near, whoever launches and recovers the vehicles clears the way
 COASTS = 2.0  # s at its speed that a vehicle may have gone on from where it was heard last
 Tell = Callable[[float, Mission], None]
@@ -44,6 +43,8 @@ class _Memory:
     they found no way, `undone` what earlier plans told could not be done. `untried` have not been heard of since they were
     told of the plan: how far they say to have come is how far they had come by the one before it. `sent` are the waypoints
     that each was commanded last, `serving` the task that it is at by them, and since when.
+    they found no way, `undone` what earlier plans told could not be done. `wrecks` are the ids that those who were given
+    up have as obstacles, by vehicle, `found` the ids of what robots have found.
     """
 
     mission: Mission
@@ -62,6 +63,8 @@ class _Memory:
     untried: frozenset[str] = frozenset()
     sent: Mapping[str, tuple[Waypoint, ...]] = field(default_factory=dict)
     serving: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    wrecks: Mapping[str, str] = field(default_factory=dict)
+    found: frozenset[str] = frozenset()
 
 
 def recovering(mission: Mission, *, delay: float = 0.0, tell: Tell | None = None) -> Director:
@@ -158,14 +161,13 @@ def _replanned(
         headings={v: s.heading for v, s in states.items()},
         begun={task: (v, time - since if states[v].alive else 0.0) for v, (task, since) in now.serving.items()},
     )
-    wrecks = {w.id: w for v in sorted(now.given_up) if (w := _wreck(first, v, working, states)) is not None}
-    known = {o.id for o in now.mission.site.obstacles}
-    again = {_wreck_id(v) for v in working} | ({o for o in known if o.startswith(FOUND)} if found else set())
+    new = {v: w for v in sorted(now.given_up - now.wrecks.keys()) if (w := _wreck(first, v, working, states)) is not None}
+    afloat = working & now.wrecks.keys()
     changes = Changes(
         lost=frozenset(planned & now.given_up),
         back=dict.fromkeys(sorted(working - planned)),
-        obstacles=(*(w for w in wrecks.values() if w.id not in known), *found),
-        gone=frozenset(known & again) - {o.id for o in first.site.obstacles},  # what the site has stays, whatever its name
+        obstacles=(*new.values(), *found),
+        gone=frozenset(now.wrecks[v] for v in afloat) | (now.found if found else frozenset()),
     )
     try:
         after = replan(now.mission, progress, changes, anew=True)
@@ -174,6 +176,8 @@ def _replanned(
     if tell:
         tell(time, after)
     told = {r.vehicle: r for r in after.routes if states[r.vehicle].alive}
+    # A plan numbers what is new and has the name of something else.
+    ids = [o.id for o in after.site.obstacles[len(after.site.obstacles) - len(changes.obstacles) :]]
     left = (*now.undone, *undone(now.inner), *(r for r in after.reasons if r.kind == "undone"))
     return replace(
         now,
@@ -189,6 +193,8 @@ def _replanned(
         untried=frozenset(told),
         sent={v: way for v, way in now.sent.items() if v not in told},
         serving={v: work for v, work in now.serving.items() if v not in told},
+        wrecks={v: i for v, i in now.wrecks.items() if v not in afloat} | dict(zip(new, ids, strict=False)),
+        found=frozenset(ids[len(new) :]) if found else now.found,
     )
 
 
@@ -207,11 +213,7 @@ def undone(memory: Any) -> tuple[Reason, ...]:
 def _found(found: list[MultiPolygon]) -> tuple[Obstacle, ...]:
     """Return all that robots found as obstacles for vehicles on the ground."""
     parts = as_multipolygon(shapely.union_all(found)).geoms
-    return tuple(Obstacle(f"{FOUND}{n}", part, frozenset({"ground"})) for n, part in enumerate(parts, start=1))
-
-
-def _wreck_id(vehicle: str) -> str:
-    return f"wreck of {vehicle}"
+    return tuple(Obstacle(f"found-{n}", part, frozenset({"ground"})) for n, part in enumerate(parts, start=1))
 
 
 def _wreck(first: Mission, lost: str, working: set[str], states: Mapping[str, State]) -> Obstacle | None:
@@ -226,4 +228,6 @@ def _wreck(first: Mission, lost: str, working: set[str], states: Mapping[str, St
     hull = 0.5 * float(np.hypot(length, vehicle.model.width))
     free = min((here.distance(Point(states[v].x, states[v].y)) for v in working), default=inf)
     radius = min(hull + COASTS * vehicle.speed, 0.9 * free)
-    return Obstacle(_wreck_id(lost), here.buffer(radius, quad_segs=4), frozenset({vehicle.domain})) if radius > 0 else None
+    return (
+        Obstacle(f"wreck of {lost}", here.buffer(radius, quad_segs=4), frozenset({vehicle.domain})) if radius > 0 else None
+    )

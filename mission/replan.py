@@ -10,8 +10,8 @@ from quarterdeck.geo.scenario import Scenario, Site, Task, Vehicle
 from quarterdeck.mission.changes import Changes as Changes
 from quarterdeck.mission.changes import changed_site, check_changes
 from quarterdeck.mission.guard_recovery import guards_from_now, with_confirmed
-from quarterdeck.mission.mission import Layer, Mission, Route, Waypoint
-from quarterdeck.mission.progress import Progress, energy_left, with_surveyed
+from quarterdeck.mission.mission import Mission, Route, Waypoint
+from quarterdeck.mission.progress import Progress, budget_left, with_surveyed
 from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.recorded import as_planned
 from quarterdeck.mission.survey_recovery import survey_from_now
@@ -86,8 +86,8 @@ def _survivors(mission: Mission, progress: Progress, changes: Changes) -> tuple[
 def _moved(vehicle: Vehicle, progress: Progress) -> Vehicle:
     x, y, _ = progress.positions.get(vehicle.id, (*vehicle.start, 0.0))
     used = progress.energy.get(vehicle.id, 0.0)
-    left = energy_left(vehicle.battery, used)
-    endurance = energy_left(vehicle.endurance, progress.time)
+    left = budget_left(vehicle.battery, used)
+    endurance = budget_left(vehicle.endurance, progress.time)
     heading = progress.headings.get(vehicle.id)
     return replace(vehicle, start=(x, y), end=vehicle.home, battery=left, endurance=endurance, heading=heading)
 
@@ -138,18 +138,11 @@ def _rest(mission: Mission, progress: Progress) -> Mission:
         vehicles=vehicles,
         lost=lost,
         parameters=told,
-        layers=_with_surveyed_layer(mission, progress),
+        surveyed=() if mission.spacing is None else with_surveyed(mission, progress.tracks),
         tasks=tasks_left(mission, mission.tasks, progress, {v.id for v in vehicles}) if mission.tasks else (),
         figures=dict(mission.figures) | left,
         reasons=(*(r for r in mission.reasons if r.kind != "energy"), *reasons),
     )
-
-
-def _with_surveyed_layer(mission: Mission, progress: Progress) -> tuple[Layer, ...]:
-    if mission.spacing is None:
-        return mission.layers
-    done = with_surveyed(mission, progress.tracks)
-    return (*(layer for layer in mission.layers if layer.name != done.name), *((done,) if done.geometries else ()))
 
 
 def _route_left(route: Route, progress: Progress, vehicle: Vehicle) -> Route:

@@ -26,7 +26,6 @@ from quarterdeck.mission.timing import RESERVE, seconds_out, shortfalls
 VISITED = 0.25  # spacings: a survey line is done where a track ran along it so near
 ROUNDS = 2  # of sharing out again, once ways and turns are known
 CUTS = 20  # tries to fit routes into the energy left
-LEFT_OUT = "left out"  # the layer of lines that nobody can do any more
 
 
 def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, changes: Changes, *, seed: int) -> Mission:
@@ -34,7 +33,7 @@ def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, ch
 
     `scenario` is the world as it is now: the site, and the vehicles that work, where they are, with the energy that they
     have left. Areas of a higher priority come first. What nobody can get to, or has the energy for, is left out, told in
-    square metres, and kept in the layer `LEFT_OUT` for whoever replans when there is help.
+    square metres, and kept in `left_out` for whoever replans when there is help.
     """
     spacing = float(mission.spacing or 0.0)
     roads = roadmaps(scenario)
@@ -46,7 +45,7 @@ def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, ch
     left = [line.points for line in survey.left]
     ahead = [t for v, r in zip(scenario.vehicles, survey.routes, strict=True) for t in survey_tracks(v, r)]
     done = with_surveyed(mission, progress.tracks)
-    driven = _swath([*(np.array(line.coords) for line in done.geometries), *ahead], spacing)
+    driven = _swath([*(np.array(line.coords) for line in done), *ahead], spacing)
     site = scenario.site.coverable
     gaps = as_multipolygon(_swath(left, spacing).intersection(site).difference(driven))
     rim = as_multipolygon(_swath(cut, spacing).intersection(site).difference(driven).difference(gaps))
@@ -67,7 +66,9 @@ def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, ch
         },
         bounds={},
         reasons=(*told, *survey.reasons),
-        layers=(*_layers(left, gaps, rim), *((done,) if done.geometries else ())),
+        layers=_undone_layers(gaps, rim),
+        surveyed=done,
+        left_out=tuple(LineString(line) for line in left),
     )
 
 
@@ -81,11 +82,10 @@ def _why(left: Sequence[Line]) -> str:
     return "no working vehicle can get there" if not any(x.able.any() for x in left) else "the energy left does not suffice"
 
 
-def _layers(left: Sequence[np.ndarray], gaps: MultiPolygon, rim: MultiPolygon) -> tuple[Layer, ...]:
-    """Return what is not done: the lines, for whoever replans next, and the areas, with why."""
+def _undone_layers(gaps: MultiPolygon, rim: MultiPolygon) -> tuple[Layer, ...]:
+    """Return the areas that are not done, with why."""
     areas = [(g, why) for g, why in ((gaps, "left out"), (rim, "too near to what is new")) if g.area > 0]
-    lines = Layer(LEFT_OUT, tuple(LineString(line) for line in left), tuple({"stroke": "#d62728"} for _ in left))
-    return (*((lines,) if left else ()), *((undone_layer(areas),) if areas else ()))
+    return (undone_layer(areas),) if areas else ()
 
 
 class _Access:
@@ -121,7 +121,7 @@ def _undone(
     """Return the (n, 2) lines still to be driven, by whose they are, and those that something new may have cut."""
     short = VISITED * float(mission.spacing or 0.0)
     every = [(r.vehicle, run) for r in mission.routes for run in unbroken(r.xyz[:, :2], r.survey)]
-    every += [(None, np.array(line.coords)) for line in mission.layer(LEFT_OUT).geometries]  # type: ignore[misc]
+    every += [(None, np.array(line.coords)) for line in mission.left_out]  # type: ignore[misc]
     parts = remaining_parts([run for _, run in every], progress.tracks, short)
     undone = [(owner, left) for (owner, _), left in zip(every, parts, strict=True)]
     if not (changes.obstacles or changes.withdrawn):

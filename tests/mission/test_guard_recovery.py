@@ -37,10 +37,8 @@ def husky(name: str, x: float, y: float) -> Vehicle:
 
 def confirmed(mission: Mission, served: frozenset[str]) -> tuple[np.ndarray, np.ndarray]:
     """Return places and ranges of the guards served."""
-    layer = mission.layers[0]
-    used = [i for i, p in enumerate(layer.properties) if f"guard-{p['guard']}" in served]
-    places = shapely.get_coordinates(layer.geometries)[used].reshape(-1, 2)
-    return places, np.array([layer.properties[i]["range"] for i in used])
+    used = [g for i, g in enumerate(mission.guards) if f"guard-{i}" in served]
+    return np.array([(g.x, g.y) for g in used]).reshape(-1, 2), np.array([g.range for g in used])
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +67,7 @@ def test_a_guard_confirmed_before_a_plan_confirms_none_of_it(plan: tuple[Scenari
     _, memory = director(0.0, states, (), None)
     _, memory = director(1.0, states, (Event("served", "a", first), Event("lost", "c")), memory)
     _, memory = director(2.0, states, (Event("lost", "b"),), memory)
-    assert [sum(p["seen"] for p in after.layer("guards").properties) for after in told] == [1, 1]
+    assert [sum(g.seen for g in after.guards) for after in told] == [1, 1]
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.8])

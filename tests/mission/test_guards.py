@@ -34,9 +34,8 @@ def test_everything_is_seen_and_every_guard_is_passed_once(mode: str, clearance:
     mission = plan_guards(given, range=12.0, mode=mode)  # type: ignore[arg-type]
     assert mission.feasible
     assert mission.figures["certificate"]["uncovered"] == 0.0
-    layer = next(layer for layer in mission.layers if layer.name == "guards")
-    guards = shapely.get_coordinates(layer.geometries)
-    ranges = np.array([p["range"] for p in layer.properties])
+    guards = np.array([(g.x, g.y) for g in mission.guards])
+    ranges = np.array([g.range for g in mission.guards])
     site = given.site
     assert uncovered_by_shadows(site.coverable, site.navigable("ground"), guards, ranges).area < 1e-9 * site.coverable.area
     stops = [w for route in mission.routes for w in route.waypoints if w.task]
@@ -66,7 +65,7 @@ def test_borders_are_inspected_with_fewer_guards_than_the_area() -> None:
     mission = plan_guards(given, range=9.0, inspect="border")
     assert mission.feasible
     assert mission.figures["guards"] < plan_guards(given, range=9.0, mode="paper").figures["guards"]
-    guards = shapely.points(shapely.get_coordinates(mission.layers[0].geometries))
+    guards = shapely.points([(g.x, g.y) for g in mission.guards])
     border = given.site.coverable.boundary
     steps = [border.interpolate(at) for at in np.arange(0, border.length, 0.5)]
     free = given.site.coverable.buffer(1e-6)
@@ -104,12 +103,11 @@ def test_a_robot_of_longer_range_leaves_guards_out() -> None:
     mixed = replace(given, vehicles=(replace(near, range=12.0), replace(far, range=30.0)))
     mission = plan_guards(mixed)
     assert mission.figures["guards"] < plan_guards(given, range=12.0).figures["guards"]
-    layer = mission.layers[0]
-    passed = [i for i, p in enumerate(layer.properties) if p["vehicle"]]
-    ranges = np.array([layer.properties[i]["range"] for i in passed])
+    passed = [g for g in mission.guards if g.vehicle]
+    ranges = np.array([g.range for g in passed])
     assert set(ranges) == {12.0, 30.0}
     site = given.site
-    guards = shapely.get_coordinates(layer.geometries)[passed]
+    guards = np.array([(g.x, g.y) for g in passed])
     assert uncovered_by_shadows(site.coverable, site.navigable("ground"), guards, ranges).area < 1e-9 * site.coverable.area
 
 
