@@ -42,9 +42,8 @@ class _Memory:
     who is held for lost; `wake` when the next silence has lasted too long. `barred` are vehicles and the tasks to which
     they found no way, `undone` what earlier plans told could not be done. `untried` have not been heard of since they were
     told of the plan: how far they say to have come is how far they had come by the one before it. `sent` are the waypoints
-    that each was commanded last, `serving` the task that it is at by them, and since when.
-    they found no way, `undone` what earlier plans told could not be done. `wrecks` are the ids that those who were given
-    up have as obstacles, by vehicle, `found` the ids of what robots have found.
+    that each was commanded last, `serving` the task that it is at by them, and since when. `wrecks` are the ids that those
+    who were given up have as obstacles, by vehicle, `found` the ids of what robots have found.
     """
 
     mission: Mission

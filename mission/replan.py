@@ -35,7 +35,7 @@ def replan(
     """
     check_changes(mission, changes)
     if not (changes or anew) and as_planned(mission, progress):
-        return with_confirmed(_rest(mission, progress), progress.served)
+        return _over(mission, with_confirmed(_rest(mission, progress), progress.served), progress.time)
     seed = mission.seed if seed is None else seed
     site = changed_site(mission.site, changes)
     vehicles, stranded = _homes(site, _survivors(mission, progress, changes))
@@ -59,7 +59,7 @@ def replan(
         raise InputError(f"a plan made by {mission.method!r} has no survey lines to share out; plan the rest as a site")
     gone = {v.id: _moved(v, progress) for v in (*mission.lost, *mission.vehicles)}
     working = {v.id for v in vehicles}
-    return replace(
+    after = replace(
         after,
         routes=tuple(_airborne(r, v, progress) for v, r in zip(vehicles, after.routes, strict=True)),
         parameters=dict(mission.parameters) | {"replanned_at": progress.time, "lost": sorted(changes.lost)},
@@ -67,6 +67,7 @@ def replan(
         reasons=(*stranded, *after.reasons),
         lost=tuple(v for i, v in gone.items() if i not in working),
     )
+    return _over(mission, after, progress.time)
 
 
 def _survivors(mission: Mission, progress: Progress, changes: Changes) -> tuple[Vehicle, ...]:
@@ -155,6 +156,15 @@ def _route_left(route: Route, progress: Progress, vehicle: Vehicle) -> Route:
     moved = tuple(replace(w, time=w.time - now) for w in ahead)
     energy = route.energy * max(0.0, 1.0 - now / route.duration) if route.duration else 0.0
     return Route(route.vehicle, (start, *moved), energy)
+
+
+def _over(mission: Mission, after: Mission, time: float) -> Mission:
+    """Return the mission from `time` on, with a note where nobody has anything left to do."""
+    if any(r.duration > 0 for r in after.routes):
+        return after
+    end = max(r.duration for r in mission.routes)
+    note = "nothing is left to do" + (f": the plan was over at {end:,.0f} s" if time >= end else "")
+    return replace(after, figures={**after.figures, "notes": [*after.figures.get("notes", ()), note]})
 
 
 def _airborne(route: Route, vehicle: Vehicle, progress: Progress) -> Route:

@@ -24,6 +24,7 @@ from quarterdeck.cli.parameters import Real
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from quarterdeck.mission.changes import Changes
     from quarterdeck.mission.mission import Mission
     from quarterdeck.mission.progress import Progress
 
@@ -36,11 +37,11 @@ if TYPE_CHECKING:
               help="A log of what really happened, as for `report`; repeatable. Without: all went as planned.")  # fmt: skip
 @click.option("--start", metavar="TIME", help="When the mission began, as 2026-06-01T12:00:00Z; default: by the logs.")
 @reads("--state", pipe=True, metavar="REPORT", help="A report of `simulate` or `report` instead of logs.")
-@reads("--changes", "changed", pipe=True, metavar="GEOJSON", help="What is different, a feature a change: docs/replan.md.")
-@click.option("--lost", default="", help="Ids of the vehicles that are lost, with commas; ID@SECONDS: since when.")
-@reads("--add", pipe=True, metavar="SITE", help="GeoJSON of what is new: obstacles, areas, tasks, vehicles that join.")
-@click.option("--gone", default="", help="Ids of obstacles that are no more, with commas.")
-@click.option("--withdrawn", default="", help="Ids of areas and tasks that need not be done any more, with commas.")
+@reads("--changes", "--add", "changed", pipe=True, multiple=True, metavar="GEOJSON",
+       help="What is different, a feature a change (docs/replan.md), or new: a site; repeatable.")  # fmt: skip
+@click.option("--lost", default="", help="Short for a change: ids of vehicles that are lost; ID@SECONDS: since when.")
+@click.option("--gone", default="", help="Short for a change: ids of obstacles that are no more, with commas.")
+@click.option("--withdrawn", default="", help="Short for a change: ids of areas and tasks that need not be done any more.")
 @click.option("--seed", type=click.IntRange(min=0), help="Seed of all that is random; default the plan's.")
 @time_limit_option
 @force_option
@@ -48,12 +49,11 @@ def command(
     plan: str,
     output: str,
     time: float | None,
-    changed: str | None,
+    changed: tuple[str, ...],
     tracks: tuple[str, ...],
     start: str | None,
     state: str | None,
     lost: str,
-    add: str | None,
     gone: str,
     withdrawn: str,
     seed: int | None,
@@ -62,24 +62,15 @@ def command(
 ) -> int:
     """Write the mission of PLAN from now on: what is done stays done, survivors go on from where they are and come home."""
     from quarterdeck.api import within
-    from quarterdeck.geo.errors import InputError
-    from quarterdeck.mission.changes import Changes, check_changes, read_changes
+    from quarterdeck.mission.changes import check_changes, read_changes
     from quarterdeck.mission.planfile import plan_text, read_plan
     from quarterdeck.mission.replan import replan
 
     tell_compiling()
     mission = read_plan(plan)
-    since: dict[str, float] = {}
-    for item in _ids(lost):
-        vehicle, _, moment = item.partition("@")
-        try:
-            since[vehicle] = float(moment) if moment else math.inf
-        except ValueError:
-            raise InputError(f"--lost {item}: {moment!r} is no number of seconds; write ID or ID@SECONDS") from None
-    gone_ids, withdrawn_ids = frozenset(_ids(gone)), frozenset(_ids(withdrawn))
-    changes = Changes(lost=frozenset(since), since=since, gone=gone_ids, withdrawn=withdrawn_ids)
-    for source in (add, changed):
-        changes |= read_changes(source, mission) if source else Changes()
+    changes = _removed(lost, gone, withdrawn)
+    for source in changed:
+        changes |= read_changes(source, mission)
     check_changes(mission, changes)
     stopped = {v: changes.since.get(v, math.inf) for v in changes.lost}
     so_far = _progress(mission, time, tracks, start, state, stopped)
@@ -87,6 +78,22 @@ def command(
     emit(plan_text(after), output, force=force)
     print_figures(after)
     return 0 if after.feasible else 1
+
+
+def _removed(lost: str, gone: str, withdrawn: str) -> Changes:
+    """Return the changes that the short forms stand for: ids with commas."""
+    from quarterdeck.geo.errors import InputError
+    from quarterdeck.mission.changes import Changes
+
+    ids, since = set[str](), dict[str, float]()
+    for item in _ids(lost):
+        vehicle, at, moment = item.partition("@")
+        ids.add(vehicle)
+        try:
+            since |= {vehicle: float(moment)} if at else {}
+        except ValueError:
+            raise InputError(f"--lost {item}: {moment!r} is no number of seconds; write ID or ID@SECONDS") from None
+    return Changes(lost=frozenset(ids), since=since, gone=frozenset(_ids(gone)), withdrawn=frozenset(_ids(withdrawn)))
 
 
 def _progress(
