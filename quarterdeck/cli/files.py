@@ -30,9 +30,9 @@ def takes(name: str, *, pipe: bool = True, **attributes: Any) -> Decorator:
     return click.argument(name, type=Source(allow_dash=pipe), is_eager=True, **attributes)
 
 
-def reads(*names: str, pipe: bool = False, metavar: str = "FILE", help: str) -> Decorator:  # noqa: A002 - click's own name
+def reads(*names: str, pipe: bool = False, metavar: str = "FILE", help: str, **attributes: Any) -> Decorator:  # noqa: A002
     """Return the option of a file to read, as `takes`."""
-    return click.option(*names, type=Source(allow_dash=pipe), is_eager=True, metavar=metavar, help=help)
+    return click.option(*names, type=Source(allow_dash=pipe), is_eager=True, metavar=metavar, help=help, **attributes)
 
 
 def writes(*names: str, metavar: str = "FILE", help: str, **attributes: Any) -> Decorator:  # noqa: A002 - click's own name
