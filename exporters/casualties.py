@@ -7,6 +7,7 @@ first step gives an order, not a diagnosis), `category` what the medic confirmed
 import csv
 import io
 from collections.abc import Iterable
+from dataclasses import asdict
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
@@ -16,8 +17,10 @@ from lxml import etree
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.features import collection, feature, point_feature
 from quarterdeck.geo.palette import CASUALTY
+from quarterdeck.geo.version import VERSION
 from quarterdeck.mission.triage.figures import figures
 from quarterdeck.mission.triage.outcome import Fate, Outcome
+from quarterdeck.mission.triage.settings import as_parameters
 
 MEANING = {"red": "immediate", "yellow": "delayed", "green": "minimal", "grey": "expectant", "black": "dead"}
 _TIMES = ("found", "reported", "delivered", "reached", "treated")
@@ -31,10 +34,24 @@ _PRECEDENCE = {"red": "urgent", "yellow": "priority", "green": "routine", "grey"
 def casualties_geojson(outcome: Outcome) -> str:
     """Return the casualties that somebody found as GeoJSON text, with position, uncertainty, colour, who and when.
 
-    The first feature has no geometry and the mission's figures. Times are seconds from the mission's start.
+    The first feature has no geometry; it has the mission's figures and, as a PLAN's header, all that they came of: version,
+    settings, faults, seed and the site's SHA-256. Times are seconds from the mission's start.
     """
     plain = {k: None if not np.isfinite(v) else round(v, 3) for k, v in figures(outcome).items()}
-    head = feature("triage", None, method=outcome.method, seed=outcome.seed, figures=plain, reasons=outcome.reasons)
+    head = feature(
+        "triage",
+        None,
+        version=VERSION,
+        method=outcome.method,
+        reasons=outcome.reasons,
+        seed=outcome.seed,
+        parameters={
+            "settings": as_parameters(outcome.settings),
+            "faults": [asdict(f) | {"until": f.until if np.isfinite(f.until) else None} for f in outcome.faults],
+        },
+        figures=plain,
+        input_hash=outcome.scenario.input_hash,
+    )
     features = [head]
     for fate in outcome.fates:
         if fate.found is None:

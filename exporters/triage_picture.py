@@ -90,14 +90,15 @@ def telling_moments(outcome: Outcome) -> list[tuple[float, str]]:
             seen.add(key)
             later = 1.0 if entry.what == "handed" else 0.0  # then the UAV is on its way
             found.append((entry.time + later, words[key].format(who=entry.who, whom=entry.whom, about=entry.about)))
-    searched = [e.time for e in outcome.log if e.whom == "section searched"]
-    if searched:
-        found.append((max(searched), "all that could be searched is searched"))
-    found.append((outcome.end, "the end"))
+    searched = {e.about: e.time for e in outcome.log if e.what == "searched"}
+    if searched.keys() >= outcome.team.ugvs.keys():
+        found.append((max(searched.values()), "all that could be searched is searched"))
+    end = max([outcome.end, *(time for time, _ in found)])
     apart: list[tuple[float, str]] = []
     for moment in sorted(found):
-        if not apart or moment[0] - apart[-1][0] > 0.01 * outcome.end or moment[1] == "the end":
+        if not apart or moment[0] - apart[-1][0] > 0.01 * end:
             apart.append(moment)
+    apart.append((end, "the run was cut short" if outcome.run.reason else "the end"))
     while 1 < len(apart) < 6:
         before, after = max(pairwise([(0.0, ""), *apart]), key=lambda pair: pair[1][0] - pair[0][0])
         time = (before[0] + after[0]) / 2

@@ -60,8 +60,8 @@ class Fault:
 class Run:
     """What happened. `tracks` (n, 3) seconds, x, y by actor, straight in between; `events` (time, event) in order.
 
-    `end` is the time of the last event; `memory` is what the director had in mind then. `reason` says why the run was cut
-    short, if it was.
+    `end` is the time of the last event, or when the run was cut short: `reason` says why, if it was. `memory` is what the
+    director had in mind then.
     """
 
     tracks: Mapping[str, np.ndarray]
@@ -189,7 +189,7 @@ def run_world(
         log += [(now, e) for e in events]
     for i, plan in enumerate(plans):
         tracks[i].append(plan.knots if reason == "" else _until(plan.knots, until))
-    return Run({ids[i]: _joined(tracks[i]) for i in range(n)}, tuple(log), now, memory, reason)
+    return Run({ids[i]: _joined(tracks[i]) for i in range(n)}, tuple(log), until if reason else now, memory, reason)
 
 
 class _Plan:

@@ -16,7 +16,7 @@ from quarterdeck.mission.fast import run_fast
 from quarterdeck.mission.inspection import default_director
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.recovery import undone
-from quarterdeck.mission.triage.plan import METHOD
+from quarterdeck.mission.triage.plan import METHOD, run_plan
 from quarterdeck.physics.faults import in_fast_world, read_faults
 from quarterdeck.physics.mapping import agreement
 from quarterdeck.physics.report import Report, check_limits, measure
@@ -91,10 +91,13 @@ def simulate(
         limits = {"delay": LATE} | dict(limits or {})
     if expected is None and director is None and mission.method == "assign":
         expected = default_director(mission)
-    plan = mission
+    # Before the run, whose time may be limited: what it is held against is not cut short with it.
+    aside = run_plan(mission, in_fast_world(befalling)) if triage else None
+    fast = run_fast(mission, expected, in_fast_world(befalling), until=until) if expected and not triage else None
     known, director = mission.site, director or default_director(mission)
     there = known.obstacles if sensing.world is None else sensing.world
     mission = replace(mission, site=replace(known, obstacles=(*there, *sensing.unmapped)))
+    cut = ""
     with open_world(step) as world:
         air = np.array([*wind, 0.0])
         run = Running(mission, director, world, seed, np.array(current), air, gusts, befalling, sensing, known, terrain)
@@ -105,7 +108,7 @@ def simulate(
         count = 0
         while not run.done and run.time < until - step / 2:
             if time_is_up("the run"):
-                run.trouble.append(f"the run was stopped at {run.time:,.0f} s of the mission ({cause()})")
+                cut = f"the run was stopped at {run.time:,.0f} s of the mission ({cause()})"
                 run.record(builder)
                 break
             run.advance()
@@ -119,10 +122,12 @@ def simulate(
                 run.record(builder)
     trace = builder.trace()
     compared = None
-    if triage:
-        late = "" if run.done else f"the mission was not over after {until:,.0f} s"
-        compared = compare(mission, run.memory, trace, befalling, late)
+    if aside is not None:
+        late = cut or ("" if run.done else f"the mission was not over after {until:,.0f} s")
+        compared = compare(mission, run.memory, trace, befalling, late, aside)
         mission = compared.expected
+    elif cut:
+        run.trouble.append(cut)
     settings: dict[str, Any] = {
         "seed": seed,
         "step": step,
@@ -153,7 +158,7 @@ def simulate(
         triage=compared.document() if compared else None,
         servers=run.servers,
         undone=undone(run.memory),
-        fast=run_fast(plan, expected, in_fast_world(befalling), until=until) if expected and not triage else None,
+        fast=fast,
     )
     made = None
     if sensing.mapping and run.router is not None:

@@ -53,7 +53,8 @@ class Fate:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """A mission that has been run. `end` is when the last casualty was treated or the last UGV finished its search.
+    """A mission that has been run. `end` is when the last casualty was treated or the last UGV finished its search or, of a
+    run that was cut short, when that was. `faults` are what befell it.
 
     `reasons` say, one line each, what could not be done; there are none if all was searched, found and treated. `told` is
     where the robots say that casualties are, which is off by their position error.
@@ -70,6 +71,7 @@ class Outcome:
     end: float
     reasons: tuple[str, ...]
     told: Mapping[str, tuple[float, float]]
+    faults: tuple[Fault, ...] = ()
 
 
 def run_triage(
@@ -107,7 +109,7 @@ def run_team(
     seen = targets(scenario, settings, seed)
     director = triage(team, METHODS[method], settings)
     run = run_world(director, actors, seen, pairs, reach_of(method, settings), faults=faults)
-    return judge(scenario, team, method, settings, run, seed=seed)
+    return replace(judge(scenario, team, method, settings, run, seed=seed), faults=tuple(faults))
 
 
 def reach_of(method: str, settings: Settings) -> float:
@@ -121,7 +123,7 @@ def judge(scenario: Scenario, team: Team, method: str, settings: Settings, run: 
     memory: Memory = run.memory
     fates = _fates(scenario, memory.log, {t.id: t.data for t in seen})
     searched = [e.time for e in memory.log if e.what == "state" and e.whom == "section searched"]
-    end = max([0.0, *searched, *(f.treated for f in fates if f.treated is not None)])
+    end = run.end if run.reason else max([0.0, *searched, *(f.treated for f in fates if f.treated is not None)])
     told = {t.id: (t.x + t.data["error"][0], t.y + t.data["error"][1]) for t in seen}
     reasons = _reasons(team, fates, memory, run)
     return Outcome(scenario, method, settings, seed, team, fates, memory.log, run, end, reasons, told)

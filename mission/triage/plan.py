@@ -1,7 +1,6 @@
 """The triage mission as a PLAN: what everybody does before anything is found, and all that its director starts from."""
 
 from collections.abc import Sequence
-from dataclasses import fields
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from quarterdeck.mission.timing import shortfalls, timed_route
 from quarterdeck.mission.triage.director import triage
 from quarterdeck.mission.triage.outcome import Outcome, run_team
 from quarterdeck.mission.triage.search import Search
-from quarterdeck.mission.triage.settings import METHODS, Settings
+from quarterdeck.mission.triage.settings import METHODS, Settings, as_parameters
 from quarterdeck.mission.triage.team import Team, make_team
 from quarterdeck.mission.world import Fault
 
@@ -52,7 +51,6 @@ def plan_triage(
     reasons = [line for v, r in zip(vehicles, routes, strict=True) for line in shortfalls(v, r)]
     if team.search.missed > 0:
         reasons.append(Reason(f"{team.search.missed:,.0f} m2 of the field cannot be seen from where the UGVs can go"))
-    given = {f.name: getattr(settings, f.name) for f in fields(settings)} | {"treat": dict(settings.treat)}
     return Mission(
         name=scenario.name,
         frame=scenario.frame,
@@ -60,7 +58,8 @@ def plan_triage(
         vehicles=vehicles,
         routes=routes,
         method=METHOD,
-        parameters={"method": method, "medics": list(team.medics), "missed": team.search.missed, "settings": given},
+        parameters={"method": method, "medics": list(team.medics), "missed": team.search.missed}
+        | {"settings": as_parameters(settings)},
         seed=seed,
         casualties=scenario.casualties,
         figures={

@@ -1,10 +1,10 @@
 """What the team can do (`Settings`) and how the four methods differ (`Policy`): everything that the paper leaves open."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from math import inf
 from types import MappingProxyType
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from quarterdeck.geo.errors import InputError
 
@@ -71,6 +71,11 @@ class Settings:
             raise InputError(f"order must be one of {', '.join(ORDERS)}, not {self.order!r}")
         if self.rendezvous not in RENDEZVOUS:
             raise InputError(f"rendezvous must be one of {', '.join(RENDEZVOUS)}, not {self.rendezvous!r}")
+
+
+def as_parameters(settings: Settings) -> dict[str, Any]:
+    """Return the settings as JSON can hold them, of which `Settings(**...)` makes them again."""
+    return {f.name: getattr(settings, f.name) for f in fields(settings)} | {"treat": dict(settings.treat)}
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import math
 from datetime import datetime, timedelta
 
 import numpy as np
@@ -11,6 +12,7 @@ from lxml import etree
 
 from quarterdeck.exporters.casualties import casualties_csv, casualties_geojson, cursor_on_target, log_csv
 from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.version import VERSION
 from quarterdeck.mission.triage.generate import generate, paper_team
 from quarterdeck.mission.triage.outcome import Outcome, run_triage
 from quarterdeck.mission.triage.settings import Settings
@@ -41,6 +43,20 @@ def test_geojson_has_each_found_casualty_with_who_and_when(outcome: Outcome) -> 
         assert given["found_by"] == fate.found_by
         assert given["treated"] == (None if fate.treated is None else pytest.approx(fate.treated, abs=1e-3))
         assert given["uncertainty"] == (0.0 if fate.reached is not None else 0.8)
+
+
+def test_geojson_tells_all_that_the_mission_came_of(outcome: Outcome) -> None:
+    """Run again with the header's settings, seed and faults, the site gives the same casualties."""
+    text = casualties_geojson(outcome)
+    head = json.loads(text)["features"][0]["properties"]
+    assert head["version"] == VERSION
+    assert head["input_hash"] == outcome.scenario.input_hash
+    told = head["parameters"]
+    faults = [Fault(**f | {"until": math.inf if f["until"] is None else f["until"]}) for f in told["faults"]]
+    assert faults == [Fault("ugv3", 120.0)]
+    settings = Settings(**told["settings"])
+    again = run_triage(outcome.scenario, head["method"], settings, seed=head["seed"], faults=faults)
+    assert casualties_geojson(again) == text
 
 
 def test_csv_rows_match_the_geojson_and_the_log(outcome: Outcome) -> None:

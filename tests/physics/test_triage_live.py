@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from shapely import box
 
+from quarterdeck.exporters.triage_picture import telling_moments
+from quarterdeck.geo.deadline import limited
 from quarterdeck.geo.scenario import Casualty, Obstacle, Scenario, Site
 from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.check import check_mission
@@ -51,6 +53,24 @@ def test_a_triage_plan_is_driven_as_the_fast_world_expects(tmp_path) -> None:  #
     assert fast == pytest.approx(run_plan(mission).end, abs=1e-3)
     assert fast < driven < 2.0 * fast
     jsonschema.Draft202012Validator(report_schema()).validate(json.loads(run.report.to_json()))
+
+
+def test_a_run_that_is_stopped_is_told_as_stopped_beside_the_whole_of_the_fast_world(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    """The stop is told once, the mission's time is that of the stop, and pictures end there; the fast world is not cut."""
+    from quarterdeck.physics.simulate import simulate
+
+    mission = planned(yard(), tmp_path)
+    with limited() as limit:
+        run = simulate(mission, progress=lambda done, _: setattr(limit, "interrupted", done >= 20.0))
+    assert run.triage is not None
+    assert [r for r in run.report.reasons if "stopped at" in r or "not over" in r] == [
+        "the run was stopped at 20 s of the mission (interrupted)"
+    ]
+    assert run.report.triage["figures"]["time"] == [pytest.approx(run_plan(mission).end, abs=1e-3), 20.0]  # type: ignore[index]
+    moments = telling_moments(run.triage.driven)
+    assert moments == sorted(moments, key=lambda m: m[0])
+    assert moments[-1] == (20.0, "the run was cut short")
+    assert not [words for _, words in moments if "all that could be searched" in words]
 
 
 @pytest.mark.parametrize("fault", ["ugv1@15", "uav1@20", "medic1@25"])
