@@ -18,11 +18,12 @@ from quarterdeck.mission.world import Actor, Fault, run_world
 class FastRun:
     """What the fast world came to: seconds to the end of each vehicle's last move, and those at which tasks were served.
 
-    `reason` says why the run was cut short, if it was.
+    `tracks` (n, 3) seconds, x, y by vehicle, straight in between. `reason` says why the run was cut short, if it was.
     """
 
     times: Mapping[str, float]
     served: Mapping[str, float]
+    tracks: Mapping[str, np.ndarray]
     reason: str = ""
 
     @property
@@ -40,7 +41,7 @@ def run_fast(mission: Mission, director: Director, faults: Sequence[Fault] = (),
     ]
     run = run_world(director, actors, (), (), 0.0, faults=faults, until=until)
     served = {e.subject: t for t, e in reversed(run.events) if e.kind == "served"}
-    return FastRun({v: _arrival(track) for v, track in run.tracks.items()}, served, run.reason)
+    return FastRun({v: _arrival(track) for v, track in run.tracks.items()}, served, run.tracks, run.reason)
 
 
 def _arrival(track: np.ndarray) -> float:

@@ -73,7 +73,8 @@ def replan(
 def _survivors(mission: Mission, progress: Progress, changes: Changes) -> tuple[Vehicle, ...]:
     """Return the vehicles that go on, where they are, with what they have left, in the shares they had among themselves."""
     staying = [_moved(v, progress) for v in mission.vehicles if v.id not in changes.lost]
-    back = [replace(_moved(v, progress), start=changes.back[v.id] or v.start) for v in mission.lost if v.id in changes.back]
+    heard = [_moved(v, progress) for v in mission.lost if v.id in changes.back]
+    back = [replace(v, start=changes.back[v.id] or v.start) for v in heard]
     vehicles = [replace(v, speed=changes.speeds.get(v.id, v.speed)) for v in (*staying, *back, *changes.joined)]
     if not vehicles:
         raise InputError("every vehicle is lost and none joins or comes back; nobody is left to replan for")

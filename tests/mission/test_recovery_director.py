@@ -2,25 +2,30 @@
 
 from dataclasses import replace
 from functools import cache
+from math import inf
 from pathlib import Path
 
+import numpy as np
 import pytest
+from shapely import LineString, union_all
 
 from quarterdeck.coverage.metrics import track_length
 from quarterdeck.geo.reader import read_scenario
 from quarterdeck.mission.cover import cover
 from quarterdeck.mission.director import Event, State
+from quarterdeck.mission.fast import run_fast
 from quarterdeck.mission.mission import unbroken
 from quarterdeck.mission.recovery import recovering
+from quarterdeck.mission.world import Fault
 
 DATA = Path(__file__).parents[2] / "data"
 SPACING = {"plant_yard": 5.0, "farm_survey": 40.0, "west_ant_island": 100.0}
 
 
 @cache
-def plan(site):
+def plan(site, spacing=None):
     """Return a coarse plan of a sample site."""
-    return cover(read_scenario(DATA / f"{site}.geojson"), spacing=SPACING[site])
+    return cover(read_scenario(DATA / f"{site}.geojson"), spacing=spacing or SPACING[site])
 
 
 def to_survey(mission):
@@ -107,3 +112,38 @@ def test_who_comes_back_late_drives_all_that_is_left():
     states |= {late: State(*mission.routes[0].xyz[0], idle=False)}
     director(2.0 + told[0].routes[0].duration / 2, states, (Event("returned", late),), memory)
     assert to_survey(told[-1]) == pytest.approx(to_survey(mission), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("reach", "fault"),
+    [
+        (None, Fault("ugv-2", 100.0, "mute", 400.0)),  # given up and heard again
+        (25.0, Fault("ugv-2", 200.0)),  # one out of touch when the other is lost: the plan was made without its place
+    ],
+)
+def test_new_routes_begin_where_the_vehicles_are(reach, fault):
+    """Who is told a new route is where it begins; its first legs are clear of obstacles and survey the plan's lines."""
+    mission = plan("plant_yard", 8.0)
+    mission = replace(mission, vehicles=tuple(replace(v, range=reach) for v in mission.vehicles))
+    plans, told = [], {}
+    direct = recovering(mission, delay=5.0, tell=lambda *plan: plans.append(plan))
+
+    def watched(time, states, events, memory):
+        commands, memory = direct(time, states, events, memory)
+        told[time] = commands.keys()
+        return commands, memory
+
+    tracks = run_fast(mission, watched, [fault]).tracks
+    lines = union_all([LineString(run) for r in mission.routes for run in unbroken(r.xyz[:, :2], r.survey)]).buffer(1.0)
+    began = set()
+    for time, after in plans:
+        for route in after.routes:
+            if route.vehicle in told[time]:  # those out of touch hear of a later plan
+                track = tracks[route.vehicle]
+                here = [np.interp(time, track[:, 0], track[:, n]) for n in (1, 2)]
+                assert np.hypot(*np.subtract(here, route.xyz[0, :2])) < 0.1
+                first = LineString(route.xyz[:4, :2])
+                assert all(first.distance(o.polygon) > 0.3 for o in after.site.obstacles if not o.id.startswith("wreck"))
+                assert all(lines.covers(LineString(run)) for run in unbroken(route.xyz[:4, :2], route.survey[:4]))
+                began.add(route.vehicle)
+    assert began == {v.id for v in mission.vehicles if fault.until < inf or v.id != fault.actor}
