@@ -3,14 +3,14 @@
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from quarterdeck.geo.errors import InputError, UnavailableError
-from quarterdeck.geo.logs import Log, from_compass, sampled
+from quarterdeck.geo.logs import Log, finite, from_compass, sampled
 
 FIX = 3  # GPS.Status from which on a position is one
 PADDING = 600  # bytes at the end of a sound log that are no messages, at the most
@@ -28,8 +28,17 @@ def read_dataflash(path: str, size: int) -> list[Log]:
         from pymavlink import DFReader
     except ImportError:
         raise UnavailableError(f"{path}: reading it needs pymavlink; pip install 'quarterdeck[logs]'") from None
+
+    class Reader(DFReader.DFReader_binary):
+        def _parse_next(self) -> Any:
+            start = self.offset
+            message = super()._parse_next()
+            if message is not None and self.offset <= start:  # it would be read for ever
+                raise ValueError(f"a message of no length at byte {start:,}")
+            return message
+
     with _silence():
-        tables, begun, base, read = _decoded(DFReader.DFReader_binary, path, size)
+        tables, begun, base, read = _decoded(Reader, path, size)
     gps = tables["GPS"]
     gps = {n: v[gps["Status"] >= FIX] for n, v in gps.items()} if "Status" in gps else gps
     placed = [t for t in (tables["POS"], gps) if {"Lat", "Lng"} <= set(t) and len(t["TimeUS"])]
@@ -61,11 +70,12 @@ def _silence() -> Iterator[None]:
     sys.stdout.flush()
     sys.stderr.flush()
     kept = {number: os.dup(number) for number in (1, 2)}
-    with Path(os.devnull).open("wb") as nowhere:
+    with Path(os.devnull).open("w", encoding="utf-8") as nowhere:
         for number in kept:
             os.dup2(nowhere.fileno(), number)
         try:
-            yield
+            with redirect_stdout(nowhere), redirect_stderr(nowhere):  # a program may have others than those two
+                yield
         finally:
             sys.stdout.flush()
             sys.stderr.flush()
@@ -111,7 +121,7 @@ def _table(reader: Any, name: str, size: int) -> dict[str, np.ndarray]:
     if name == "GPS" and instance is not None:
         rows = rows[instance == 0]
     scale = zip(form.columns, codes, form.msg_mults, strict=True)
-    columns = {n: rows[n].astype(float) * (factor or 1.0) for n, code, factor in scale if not code.startswith("S")}
+    columns = {n: finite(rows[n]) * (factor or 1.0) for n, code, factor in scale if not code.startswith("S")}
     del data
     return columns if "TimeUS" in columns else {}
 

@@ -17,6 +17,7 @@ from lxml import etree
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.frame import Frame
 
+LARGEST_CIRCLE = 1e6  # m; a site is smaller
 MOST_BYTES = 50_000_000  # of a KMZ unpacked
 _OBSTACLE = re.compile(r"obstacle|no[- ]?(go|fly|entry)|exclusion|exclude|keep[- ]?out|restricted|hole", re.IGNORECASE)
 _OPERATING = re.compile(r"operating|geo-?fence|\bfence\b|boundary", re.IGNORECASE)
@@ -50,7 +51,7 @@ def as_geojson(data: bytes) -> bytes:
         if isinstance(document, dict) and document.get("fileType") == "Plan":
             try:
                 return _features(_plan(document), ".plan")
-            except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+            except (KeyError, TypeError, ValueError, OverflowError, IndexError, AttributeError) as error:
                 raise InputError(f"is a damaged .plan ({type(error).__name__}: {error})") from None
     return data
 
@@ -169,6 +170,8 @@ def _ring(corners: list[list[float]]) -> Ring:
 
 
 def _circle(lat: float, lon: float, radius: float) -> Ring:
+    if not (abs(lat) <= 90 and abs(lon) <= 180 and 0 < radius <= LARGEST_CIRCLE):
+        raise ValueError(f"a circle of {radius:.6g} m about {lat:.6g}, {lon:.6g}")
     angles = np.append(np.arange(64) * (2 * np.pi / 64), 0.0)
     # Around the circle, not in it: what is excluded stays excluded.
     xy = radius / np.cos(np.pi / 64) * np.column_stack([np.cos(angles), np.sin(angles)])

@@ -2,7 +2,6 @@
 
 import csv
 import io
-import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -13,6 +12,7 @@ from typing import Literal
 import numpy as np
 from lxml import etree
 
+from quarterdeck.geo.arrays import load_arrays
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.kinds import kind_of
@@ -85,6 +85,13 @@ def sampled(when: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarra
     return np.interp(when, time[order], values[order], left=np.nan, right=np.nan)
 
 
+def finite(values: np.ndarray) -> np.ndarray:
+    """Return (n,) floats, NaN in place of what is no finite number: a log that is damaged may hold any."""
+    with np.errstate(invalid="ignore"):  # a signalling NaN
+        floats = values.astype(float)
+    return np.where(np.isfinite(floats), floats, np.nan)
+
+
 def from_compass(degrees: np.ndarray) -> np.ndarray:
     """Return radians counter-clockwise from east of compass degrees, without leaps at north; NaN stays NaN."""
     radians = np.pi / 2 - np.radians(degrees)
@@ -94,19 +101,21 @@ def from_compass(degrees: np.ndarray) -> np.ndarray:
 
 
 def _trace(path: str, data: bytes) -> list[Log]:
+    columns = ("x", "y", "z", "heading", "speed", "energy")
     try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as file:
-            names = [str(n) for n in file["vehicles"]]
-            frame = Frame(*file["origin"].tolist())
-            time = np.asarray(file["time"], float)
-            columns = {n: np.asarray(file[n], float) for n in ("x", "y", "z", "heading", "speed", "energy")}
-    except (ValueError, KeyError, OSError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        found = load_arrays(data, ("origin", "time", *columns), ("vehicles",))
+        names = [str(n) for n in found["vehicles"]]
+        longitude, latitude = map(float, found["origin"])
+    except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path}: is no trace of `simulate --trace` ({' '.join(str(error).split())})") from None
-    if time.ndim != 1 or any(c.shape != (len(time), len(names)) for c in columns.values()):
+    frame, time = Frame(longitude, latitude), found["time"]
+    if not (abs(longitude) <= 180 and abs(latitude) <= 90):
+        raise InputError(f"{path}: is a damaged trace: its origin is nowhere on Earth")
+    if time.ndim != 1 or any(found[c].shape != (len(time), len(names)) for c in columns):
         raise InputError(f"{path}: is a damaged trace: its columns are of different lengths")
     logs = []
     for i, name in enumerate(names):
-        own = {n: c[:, i] for n, c in columns.items()}
+        own = {n: found[n][:, i] for n in columns}
         lon, lat = frame.to_degrees(np.column_stack([own["x"], own["y"]])).T
         known = (own["z"], own["heading"], own["speed"], own["energy"])
         logs.append(Log(name, path, "mission", time, lon, lat, *known))

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from quarterdeck.geo.errors import InputError, UnavailableError
-from quarterdeck.geo.logs import Log, from_compass, sampled
+from quarterdeck.geo.logs import Log, finite, from_compass, sampled
 
 HEARTBEAT, SYS_STATUS, ATTITUDE, GLOBAL_POSITION, BATTERY = 0, 1, 30, 33, 147
 WANTED = (HEARTBEAT, SYS_STATUS, ATTITUDE, GLOBAL_POSITION, BATTERY)
@@ -103,7 +103,7 @@ def _payloads(raw: np.ndarray, starts: np.ndarray, lengths: np.ndarray, message:
     index = np.minimum((starts + head)[:, None] + place, len(raw) - 1)
     payload = np.where(place < lengths[:, None], raw[index], 0).astype(np.uint8)
     rows = payload.view(row)[:, 0] if len(starts) else np.empty(0, row)
-    return {name: rows[name].astype(float) for name in row.names or ()}
+    return {name: finite(rows[name]) for name in row.names or ()}
 
 
 def _log(path: str, system: str, tables: dict[int, dict[str, np.ndarray]], mavutil: Any, notes: tuple[str, ...]) -> Log:

@@ -6,7 +6,6 @@ ESRI ASCII grid in metres of the frame.
 """
 
 import warnings
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,11 +16,11 @@ from pyproj import CRS
 from pyproj.exceptions import ProjError
 from shapely.geometry.base import BaseGeometry
 
+from quarterdeck.geo.arrays import load_arrays
 from quarterdeck.geo.errors import InputError, UnavailableError
 from quarterdeck.geo.frame import Frame
 
 Bounds = tuple[float, float, float, float]
-MOST_BYTES = 200_000_000  # of an NPZ unpacked
 MOST_NODES = 16_000_000  # 128 MB
 LOWEST, HIGHEST = -11_000.0, 9_000.0  # m: what is beyond is a void that the file does not declare
 VOIDS = (-9999.0, -32768.0, -32767.0)
@@ -91,8 +90,9 @@ def read_terrain(path: str, frame: Frame, bounds: Bounds) -> Terrain:
     plain = Path(path).suffix.lower() == ".asc" and not any(Path(path).with_suffix(s).exists() for s in (".prj", ".PRJ"))
     try:
         if Path(path).suffix.lower() == ".npz":
-            (x, y), cell, heights = _load(path)
-            return Terrain((float(x), float(y)), float(cell), heights, Path(path).name)
+            found = load_arrays(Path(path).read_bytes(), ("origin", "cell", "heights"))
+            x, y = found["origin"]
+            return Terrain((float(x), float(y)), float(found["cell"]), found["heights"], Path(path).name)
         if plain:
             return _read_ascii(Path(path).read_text(encoding="ascii"), Path(path).name)
         with Path(path).open("rb"):
@@ -108,21 +108,6 @@ def read_terrain(path: str, frame: Frame, bounds: Bounds) -> Terrain:
         what = " ".join(str(error).split())[:120]
         raise InputError(f"{path}: is neither NPZ of origin, cell, heights nor an ESRI ASCII grid ({what})") from None
     return _read_raster(path, frame, bounds)
-
-
-def _load(path: str) -> list[np.ndarray]:
-    """Return origin, cell and heights of an NPZ file. Raises ValueError if it is damaged, or unpacks to a flood."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            unpacked = sum(entry.file_size for entry in archive.infolist())
-        if unpacked > MOST_BYTES:
-            raise ValueError(f"it unpacks to more than {MOST_BYTES // 1_000_000} MB")
-        with np.load(path) as file:
-            return [file[name].astype(float, casting="safe") for name in ("origin", "cell", "heights")]
-    except (OSError, KeyError, ValueError, TypeError, MemoryError):
-        raise
-    except Exception as error:  # zipfile's, zlib's and the tokenizer's: whatever they meet in a damaged file
-        raise ValueError(str(error)) from None
 
 
 def _read_ascii(text: str, name: str) -> Terrain:

@@ -59,11 +59,9 @@ class Numbers(click.ParamType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
         """Return the numbers."""
-        if isinstance(value, tuple):
-            return value
         try:
-            numbers = tuple(float(part) for part in value.split(","))
-        except ValueError:
+            numbers = tuple(float(part) for part in (value if isinstance(value, tuple) else value.split(",")))
+        except (ValueError, TypeError):
             self.fail(f"{value!r} is not {self.name}: numbers with commas", param, ctx)
         if len(numbers) not in self.counts or not all(math.isfinite(number) for number in numbers):
             self.fail(f"{value!r} is not {self.name}", param, ctx)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from hashlib import sha256
@@ -130,8 +131,11 @@ def report_again(report: dict[str, Any], options: dict[str, Any], within: float)
             for p in simulate.command.params
             if p.name in options
         }
+    except (click.BadParameter, TypeError, ValueError, AttributeError) as error:  # click's types are for what is typed
+        raise InputError(f"the report's options cannot be used ({error}); simulate the plan again") from None
+    try:
         _, run = simulate.execute(**given)
-    except (click.BadParameter, TypeError) as error:
+    except TypeError as error:  # options that are lacking
         raise InputError(f"the report's options cannot be used ({error}); simulate the plan again") from None
     again = json.loads(replace(run.report, command=report["command"], state=report.get("state")).to_json())
     found = differences(report, again, within)
@@ -180,8 +184,9 @@ def _features(document: dict[str, Any]) -> dict[str, Any]:
     """Return a plan's features by a name that tells them: role, id or vehicle."""
     named: dict[str, Any] = {}
     for feature in document["features"]:
-        given = feature.get("properties") or {}
-        words = [given.get("role"), feature.get("id") or given.get("vehicle") or given.get("layer")]
+        own = feature if isinstance(feature, dict) else {}  # a plan's reader leaves out what is no feature
+        given = own["properties"] if isinstance(own.get("properties"), dict) else {}
+        words = [given.get("role"), own.get("id") or given.get("vehicle") or given.get("layer")]
         name = " ".join(str(w) for w in words if w is not None)
         named[f"{name} {len(named)}" if name in named else name] = feature
     return named
@@ -200,7 +205,7 @@ def differences(was: Any, now: Any, within: float = 0.0, where: str = "") -> Ite
 
 
 def _number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 
 def _tuples(value: Any) -> Any:

@@ -64,6 +64,7 @@ def test_drawn_speeds_are_never_negative(study: Writer) -> None:
         ("run = 3", "did you mean 'runs'"),
         ("[conditions]\nwind = 3", "did you mean 'wind_"),
         ("[conditions]\nwind_speed = -3", "m/s, mean"),
+        ("[conditions]\nwind_speed = 1" + "0" * 400, "m/s, mean"),
         ("[conditions]\nwind_speed = { uniform = [5, 1] }", "wrong way round"),
         ("[conditions]\nwind_speed = { poisson = [5, 1] }", "{ uniform = [low, high] }"),
         ("[conditions]\nfaults = 'ugv-1@5'", "list of texts"),

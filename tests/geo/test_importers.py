@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from fuzzing import samples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,20 +15,7 @@ from quarterdeck.geo.importers import as_geojson
 from quarterdeck.geo.reader import read_scenario
 
 PLANS = Path(__file__).resolve().parents[2].parent / "shared" / "formats" / "mavsdk_plans"
-
-KML = """<?xml version="1.0"?><kml xmlns="http://www.opengis.net/kml/2.2"><Document>
-<Placemark><name>field</name><Polygon><outerBoundaryIs><LinearRing><coordinates>
-10,54,0 10.01,54,0 10.01,54.01,0 10,54.01,0 10,54,0</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark>
-<Folder><name>No-fly zones</name><Placemark><name>mast</name><Polygon><outerBoundaryIs><LinearRing><coordinates>
-10.004,54.004 10.005,54.004 10.005,54.005 10.004,54.004</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark>
-</Folder>
-<Placemark><name>north start</name><Point><coordinates>10.001,54.001,3</coordinates></Point></Placemark>
-<Placemark><name>pump</name><Point><coordinates>10.002,54.002</coordinates></Point></Placemark>
-</Document></kml>"""
-
-GPX = """<gpx xmlns="http://www.topografix.com/GPX/1/1" version="1.1" creator="t">
-<wpt lat="54.1" lon="10.1"><name>a</name></wpt>
-<rte><rtept lat="54.2" lon="10.2"><name>a</name></rtept><rtept lat="54.3" lon="10.3"/></rte></gpx>"""
+KML, GPX = samples.KML.decode(), samples.GPX.decode()
 
 
 def plan(**mission):
@@ -107,6 +95,15 @@ def test_damage_is_one_line(data, words):
     with pytest.raises(InputError, match=words) as error:
         as_geojson(data)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("radius", [0, -5, 1e300, 10**400, "50", None, [50]])
+def test_circles_that_are_none(radius):
+    """A fence of no size, or of one beyond Earth's, is damage."""
+    document = plan()
+    document["geoFence"]["circles"][0]["circle"]["radius"] = radius
+    with pytest.raises(InputError, match=r"damaged \.plan"):
+        as_geojson(json.dumps(document).encode())
 
 
 @settings(deadline=None, max_examples=200)

@@ -105,6 +105,49 @@ def test_what_is_no_log(tmp_path, content, words):
     assert str(path) in str(told.value)
 
 
+def test_a_message_of_no_length(write_log, tmp_path):
+    """A format that says so would be read for ever: it is refused."""
+    path = write_log(tmp_path / "a.bin", made(), BEGAN)
+    data = bytearray(path.read_bytes())
+    of_nothing = b"\xa3\x95\x80" + bytes([77, 0]).ljust(86, b"\0")
+    path.write_bytes(data[:89] + of_nothing + b"\xa3\x95" + bytes([77]) + data[89:])
+    with pytest.raises(InputError, match="a message of no length"):
+        read_logs(str(path))
+
+
+@pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan])
+def test_figures_that_are_none(write_log, tmp_path, value):
+    """A voltage or a speed that is no number is not told; the track is."""
+    rows = made()
+    for name in ("speed", "energy"):
+        rows[name][50] = value
+    [log] = read_logs(str(write_log(tmp_path / "a.bin", rows, BEGAN)))
+    assert len(log.time) == len(rows["time"])
+    assert not np.isinf(log.speed).any()
+    assert not np.isinf(log.energy).any()
+
+
+@pytest.mark.parametrize("damage", ["kind", "shape", "origin", "text", "flood"])
+def test_damaged_traces(tmp_path, damage):
+    """Numbers of other kinds, other shapes, a place off the Earth, a header that is none: one line."""
+    columns = dict.fromkeys(("x", "y", "z", "heading", "speed", "energy"), np.zeros((5, 1)))
+    arrays = columns | {"origin": np.array([10.0, 54.0]), "time": np.arange(5.0), "vehicles": np.array(["v1"])}
+    changed = {
+        "kind": {"x": np.zeros((5, 1), complex)},
+        "shape": {"y": np.zeros((5, 2))},
+        "origin": {"origin": np.array([10.0, 1e300])},
+        "text": {},
+        "flood": {"more": np.zeros(30_000_000)},
+    }[damage]
+    path = tmp_path / "trace.npz"
+    (np.savez_compressed if damage == "flood" else np.savez)(path, **arrays | changed)
+    if damage == "text":
+        path.write_bytes(path.read_bytes().replace(b"'fortran_order'", b"\0fortran_order\0"))
+    with pytest.raises(InputError, match="trace") as told:
+        read_logs(str(path))
+    assert "\n" not in str(told.value)
+
+
 def test_several_vehicles_in_one_table(tmp_path):
     """A column `vehicle` parts them; seconds from the mission's start are taken as such; a bad row is told."""
     path = tmp_path / "fleet.csv"

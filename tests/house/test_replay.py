@@ -103,6 +103,9 @@ def test_what_differs_is_told(report: Path, tmp_path: Path, capsys) -> None:
     assert call("replay", changed, "--json") == 1
     assert [d["where"] for d in json.loads(capsys.readouterr().out)] == ["version", "figures.energy"]
     assert call("replay", changed, "--within", "1e-5") == 0
+    document["figures"]["energy"] = 10**400
+    changed.write_text(json.dumps(document), encoding="utf-8")
+    assert call("replay", changed, "--within", "1e-5") == 1
 
 
 @pytest.mark.parametrize(
@@ -111,6 +114,8 @@ def test_what_differs_is_told(report: Path, tmp_path: Path, capsys) -> None:
         ({"command": None}, "does not tell the command"),
         ({"command": {"options": {}, "files": []}}, "does not tell the command"),
         ({"command": {"options": {"plan": "plan.geojson", "seed": "x"}, "files": {}}}, "options cannot be used"),
+        ({"command": {"options": {"plan": "plan.geojson", "wind": [0.0]}, "files": {}}}, "options cannot be used"),
+        ({"command": {"options": {"plan": "plan.geojson", "amcl": 91.0}, "files": {}}}, "options cannot be used"),
         ({"type": "else"}, "neither a report"),
     ],
 )

@@ -10,6 +10,7 @@ from pathlib import PurePath
 from typing import Any
 
 import numpy as np
+from fuzzing.mutate_logs import damaged_log
 from lxml import etree
 
 from quarterdeck.geo.properties import PROPERTIES
@@ -79,6 +80,8 @@ def damaged(name: str, data: bytes, rng: np.random.Generator) -> bytes:
             return _zip(data, rng)
         if suffix in (".toml", ".yaml", ".asc", ".csv"):
             return _text(data, rng)
+        if suffix in (".bin", ".tlog"):
+            return damaged_log(data, rng)
     except (ValueError, KeyError, IndexError, TypeError, RecursionError):  # what cannot be damaged so, is so
         pass
     return _bytes(data, rng)

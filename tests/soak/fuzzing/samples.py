@@ -6,6 +6,9 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+from fuzzing.autopilot_logs import dataflash, telemetry
+
+from quarterdeck.geo.frame import Frame
 
 DATA = Path(__file__).parents[3] / "data"
 
@@ -170,6 +173,18 @@ def terrain_npz() -> bytes:
     made = io.BytesIO()
     np.savez(made, origin=np.array([-60.0, -60.0]), cell=np.array(40.0), heights=np.zeros((4, 5)))
     return made.getvalue()
+
+
+def autopilot_logs(trace: bytes) -> dict[str, bytes]:
+    """Return the logs of the first vehicle of a trace of `simulate`, as ArduRover and its ground station write them."""
+    with np.load(io.BytesIO(trace)) as file:
+        every = slice(0, None, max(1, len(file["time"]) // 300))
+        own = {name: file[name][every, 0] for name in ("x", "y", "heading", "speed", "energy")}
+        lon, lat = Frame(*file["origin"].tolist()).to_degrees(np.column_stack([own["x"], own["y"]])).T
+        time = 1_780_000_000.0 + file["time"][every]
+    rows = {"time": time, "lon": lon, "lat": lat, "height": np.zeros(len(time)), "speed": own["speed"]}
+    rows |= {"heading": 90.0 - np.degrees(own["heading"]), "energy": own["energy"]}
+    return {"log.bin": dataflash(rows, time[0]), "log.tlog": telemetry(rows, time[0])}
 
 
 def raster() -> dict[str, bytes]:
