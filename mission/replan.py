@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 from shapely import Point
 from shapely.ops import nearest_points
 
@@ -19,6 +20,7 @@ from quarterdeck.mission.task_recovery import assign_from_now, tasks_left
 from quarterdeck.mission.timing import shortfalls, timed_route
 
 NOTHING = Changes()
+LANDED = 0.5  # m above ground, and at the least from its end: who is so near, or within its length, is at home
 
 
 def replan(
@@ -86,7 +88,9 @@ def _survivors(mission: Mission, progress: Progress, changes: Changes) -> tuple[
 
 
 def _moved(vehicle: Vehicle, progress: Progress) -> Vehicle:
-    x, y, _ = progress.positions.get(vehicle.id, (*vehicle.start, 0.0))
+    x, y, z = progress.positions.get(vehicle.id, (*vehicle.start, 0.0))
+    if z < LANDED and np.hypot(x - vehicle.home[0], y - vehicle.home[1]) < max(LANDED, vehicle.model.length):
+        x, y = vehicle.home  # lest it sets out to come home by inches
     used = progress.energy.get(vehicle.id, 0.0)
     left = budget_left(vehicle.battery, used)
     endurance = budget_left(vehicle.endurance, progress.time)

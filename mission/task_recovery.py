@@ -8,12 +8,12 @@ import numpy as np
 
 from quarterdeck.geo.scenario import Scenario, Task, Vehicle
 from quarterdeck.mission.assign import assign
-from quarterdeck.mission.cover import roadmaps
-from quarterdeck.mission.mission import Mission
+from quarterdeck.mission.itinerary import itineraries
+from quarterdeck.mission.mission import Mission, Route
 from quarterdeck.mission.progress import Progress
 from quarterdeck.mission.reason import ImpossibleError, Reason
-from quarterdeck.mission.routes import line_routes
 from quarterdeck.mission.timing import seconds_out, shortfalls
+from quarterdeck.mission.travel import travel
 
 GENERATIONS = 3  # of the search, which begins with what is left of the plan: robots are waiting
 HABITS = ("objective", "weights", "shape", "shape_parameters", "tiers")  # of a plan that hold for what is left of it too
@@ -67,7 +67,7 @@ def assign_from_now(mission: Mission, scenario: Scenario, progress: Progress, *,
             figures={**after.figures, "undone": undone},
             reasons=(*reasons, *after.reasons),
         )
-    routes, missing = line_routes(scenario.vehicles, [[] for _ in vehicles], roadmaps(scenario))
+    routes, missing = _homeward(scenario)
     return replace(
         mission,
         site=scenario.site,
@@ -83,6 +83,17 @@ def assign_from_now(mission: Mission, scenario: Scenario, progress: Progress, *,
         reasons=(*reasons, *missing),
         layers=(),
     )
+
+
+def _homeward(scenario: Scenario) -> tuple[tuple[Route, ...], list[Reason]]:
+    """Return the vehicles' ways home, as plans of tasks go, and why some cannot go it or stay where they are."""
+    ways = travel(replace(scenario, tasks=()), quick=True)
+    shut = ~np.isfinite(ways.idle)
+    ways = replace(ways, idle=np.where(shut, 0.0, ways.idle))
+    routes, _ = itineraries(scenario.vehicles, (), [[] for _ in scenario.vehicles], ways, {})
+    stay = [v.id for v, stays in zip(scenario.vehicles, shut, strict=True) if stays]
+    reasons = [Reason("there is no way from its start to its end, with its clearance", "vehicle", v) for v in stay]
+    return routes, reasons + [r for v, route in zip(scenario.vehicles, routes, strict=True) for r in shortfalls(v, route)]
 
 
 def _rows(mission: Mission, vehicles: Sequence[Vehicle], left: Sequence[Task]) -> list[list[int]]:

@@ -95,7 +95,7 @@ def travel(
         idle=np.where(idle > 0, idle + 2 * climb, 0.0),
         kind=kind,
         ways=tuple(ways),
-        off=np.array(off).reshape(-1, n),
+        off=np.array(off).reshape(len(off), n),
     )
 
 

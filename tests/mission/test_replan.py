@@ -138,3 +138,13 @@ def test_start_inside():
     assert np.allclose(route.xyz[0, :2], (x, y))
     assert shapely.LineString(route.xyz[:, :2]).distance(beside.polygon) >= near - 1e-6
     assert shapely.LineString(route.xyz[1:, :2]).distance(beside.polygon) >= before.vehicle("usv-2").clearance - 1e-3
+
+
+def test_who_has_landed_does_not_set_out_to_come_home_by_inches():
+    """A vehicle that stands a few centimetres from its end, with nothing left to do, stays there."""
+    before = plan()
+    home = planned_progress(before, 1e5)
+    off = replace(home, positions={v: (x + 0.1, y - 0.1, 0.0) for v, (x, y, _) in home.positions.items()})
+    after = replan(before, off, anew=True)
+    assert [len(r.waypoints) for r in after.routes] == [1] * len(after.routes)
+    assert after.feasible
