@@ -10,15 +10,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
-from shapely import LineString, get_parts, get_rings, union_all
-from shapely.geometry.base import BaseGeometry
+from shapely import get_parts, get_rings
 
 from quarterdeck.exporters.casualties import MEANING
 from quarterdeck.exporters.map_furniture import fill
 from quarterdeck.geo.palette import CASUALTY
 from quarterdeck.mission.triage.figures import counts_over_time
-from quarterdeck.mission.triage.outcome import Outcome, track_at
+from quarterdeck.mission.triage.outcome import Outcome
 from quarterdeck.mission.triage.settings import COLOURS, SORT
+from quarterdeck.mission.triage.sight import seen_by, track_at
 
 _STAGES = (
     ("found", "delivered", "#cfcfcf", "found, no medic told"),
@@ -132,14 +132,14 @@ def draw_field(
     is hollow, one found and not told to a medic has no rim, a treated one is crossed out.
     """
     until = max(float(t[-1, 0]) for t in outcome.run.tracks.values()) if until is None else until
-    site = outcome.scenario.site
+    site, team = outcome.scenario.site, outcome.team
     shapes = [(site.area, "none", "#555555"), *((o.polygon, "#c9b8a8", "#6b5a4a") for o in site.obstacles)]
     if searched:
-        fill(ax, _searched(outcome, until), facecolor="#dfe8f2", edgecolor="none", zorder=0)
+        seen = seen_by(team, outcome.run.tracks, until).intersection(site.area)
+        fill(ax, seen, facecolor="#dfe8f2", edgecolor="none", zorder=0)
     for polygons, face, edge in shapes:
         for ring in get_rings(get_parts(polygons)):
             ax.fill(*np.array(ring.coords).T, lw=0.8, fc=face, ec=edge)
-    team = outcome.team
     looks = {u: (_UGVS[i % len(_UGVS)], "s", "ugv") for i, u in enumerate(team.ugvs)}
     looks |= dict.fromkeys(team.uavs, (_UAV, "^", "uav")) | dict.fromkeys(team.medics, (_MEDIC, "P", "medic"))
     for name, (colour, marker, kind) in looks.items():
@@ -168,16 +168,6 @@ def draw_field(
     ax.set_aspect("equal")
     ax.margins(0.03)
     ax.tick_params(labelsize=7)
-
-
-def _searched(outcome: Outcome, until: float) -> BaseGeometry:
-    """Return what UGVs have passed within their range until then."""
-    swaths = []
-    for name, robot in outcome.team.ugvs.items():
-        track = outcome.run.tracks[name]
-        path = np.vstack([track[track[:, 0] <= until, 1:], track_at(track, np.array([until]))])
-        swaths.append(LineString(np.vstack([path, path[-1:]])).simplify(0.1).buffer(robot.sees))
-    return union_all(swaths, grid_size=1e-3).intersection(outcome.scenario.site.area)
 
 
 def field_legend(outcome: Outcome) -> list[Line2D]:

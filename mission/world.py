@@ -5,7 +5,7 @@ thousands of missions a minute can be studied.
 """
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from typing import Any, Literal
@@ -23,7 +23,10 @@ _MOST_CALLS = 10_000  # at one moment: a director that commands for ever without
 
 @dataclass(frozen=True, slots=True)
 class Actor:
-    """Somebody who moves: `speed` m/s where a waypoint gives none; sees targets within `sees` metres, on the plan."""
+    """Somebody who moves: `speed` m/s where a waypoint gives none; sees targets within `sees` metres, on the plan.
+
+    `power` gives the watts drawn at (n,) speeds; without it no energy is reckoned.
+    """
 
     id: str
     x: float
@@ -31,6 +34,7 @@ class Actor:
     z: float = 0.0
     speed: float = 1.0
     sees: float = 0.0
+    power: Callable[[np.ndarray], np.ndarray] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +104,7 @@ def run_world(
     for k, (i, j) in enumerate(pairs):
         partners[i].append((k, j))
         partners[j].append((k, i))
-    plans = [_Plan(0.0, a.x, a.y, a.speed, ()) for a in actors]
+    plans = [_Plan(0.0, a.x, a.y, a, ()) for a in actors]
     tracks: list[list[np.ndarray]] = [[] for _ in actors]
     unseen = np.ones((n, len(targets)), dtype=bool)
     sight = np.full((n, len(targets)), inf)
@@ -139,7 +143,7 @@ def run_world(
             if alive[i]:
                 here = states[name]
                 tracks[i].append(_until(plans[i].knots, now))
-                plans[i] = _Plan(now, here.x, here.y, actors[i].speed, command)
+                plans[i] = _Plan(now, here.x, here.y, actors[i], command, here.energy_used)
         for name in commands:
             look_ahead(index[name], now)
 
@@ -168,7 +172,7 @@ def run_world(
             if kind == "stop":
                 here = _state(plans[i], 0.0, now, True)
                 tracks[i].append(_until(plans[i].knots, now))
-                plans[i] = _Plan(now, here.x, here.y, actors[i].speed, ())
+                plans[i] = _Plan(now, here.x, here.y, actors[i], (), here.energy_used)
                 plans[i].told = True
                 alive[i] = False
                 look_ahead(i, now)
@@ -193,11 +197,15 @@ def run_world(
 
 
 class _Plan:
-    """One actor's course from its last command: `knots` (m, 3) seconds, x, y; `served` the times its waypoints are over."""
+    """One actor's course from its last command: `knots` (m, 3) seconds, x, y; `served` the times its waypoints are over.
 
-    __slots__ = ("end", "knots", "served", "tasks", "told")
+    `used` watt-hours before it, of an actor whose energy is reckoned.
+    """
 
-    def __init__(self, time: float, x: float, y: float, speed: float, command: Command | tuple) -> None:
+    __slots__ = ("end", "knots", "power", "served", "tasks", "told", "used")
+
+    def __init__(self, time: float, x: float, y: float, actor: Actor, command: Command | tuple, used: float = 0.0) -> None:
+        speed, self.power, self.used = actor.speed, actor.power, used
         knots, self.served, self.tasks = [(time, x, y)], [], []
         for w in command.waypoints if isinstance(command, Command) else ():
             if w.time > time:
@@ -221,6 +229,16 @@ class _Plan:
         done = inf if self.told else self.end
         return min(done, self.tasks[0][0]) if self.tasks else done
 
+    def energy(self, now: float) -> float:
+        """Return the watt-hours used until now."""
+        if self.power is None:
+            return 0.0
+        time, x, y = self.knots[: int(np.searchsorted(self.knots[:, 0], now)) + 1].T
+        step = np.diff(time)
+        speed = np.hypot(np.diff(x), np.diff(y)) / np.where(step > 0, step, 1.0)
+        spent = np.diff(np.minimum(time, now)) @ self.power(speed)
+        return self.used + float(spent + self.power(np.zeros(1))[0] * max(now - self.end, 0.0)) / 3600.0
+
     def tasks_until(self, now: float) -> list[str]:
         """Take out and return the tasks that are over."""
         if not self.tasks or self.tasks[0][0] > now + SAME:
@@ -234,7 +252,7 @@ def _state(plan: _Plan, z: float, now: float, alive: bool) -> State:
     x, y, heading = _at(plan.knots, now)
     served = plan.served
     reached = len(served) if plan.end <= now + SAME else bisect_right(served, now + SAME)
-    return State(x, y, z, heading, alive, reached, reached == len(served))
+    return State(x, y, z, heading, alive, reached, reached == len(served), plan.energy(now))
 
 
 def _until(knots: np.ndarray, now: float) -> np.ndarray:

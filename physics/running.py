@@ -61,6 +61,7 @@ class Running:
         self.start = self.position[:, :2].copy()
         self.harbour = np.array([HARBOUR * v.model.length for v in vehicles])
         self.length = np.array([v.model.length for v in vehicles])
+        self.battery = np.array([v.battery for v in vehicles])
         self.random = np.random.default_rng(self.seed)
         self.gust = np.zeros((self.count, MEMORY))
         self.velocity = np.zeros((self.count, 3))
@@ -143,6 +144,7 @@ class Running:
         """Call the director, see to mooring, launching and keeping clear; once a second."""
         if self.time >= self.change:
             self._befall()
+        self._run_flat()
         reached = self._reached()
         self.events += self._serve(reached)
         self.events += [Event("lost", self.ids[i]) for i in np.flatnonzero(self.aground & ~self.given_up & ~self.lost)]
@@ -263,15 +265,26 @@ class Running:
         for i, id in enumerate(self.ids):  # noqa: A001
             squad, place = self.fleet.of(i)
             if self.suffering["lost"][i] and not self.lost[i]:
-                self.lost[i] = True
-                squad.command(place, ())
-                squad.scale[place] = 0.0
-                self.events.append(Event("lost", id, data={"kind": "stop"}))
+                self._stop(i)
             elif self.suffering["thruster"][i] != before["thruster"][i] and not self.lost[i]:
                 squad.scale[place, 0] = 0.5 if self.suffering["thruster"][i] else 1.0
             if self.suffering["comms"][i] != before["comms"][i] and not self.lost[i]:
                 kind = {"kind": "mute"}
                 self.events.append(Event("lost", id, data=kind) if self.suffering["comms"][i] else Event("returned", id))
+
+    def _run_flat(self) -> None:
+        """Stop for ever who has used up its battery."""
+        for i in np.flatnonzero((self.fleet.gather("energy") >= self.battery) & ~self.lost & ~self.aground):
+            x, y, _ = self.position[i]
+            self.trouble.append(f"{self.ids[i]}: battery empty at {self.time:.0f} s, x {x:.1f} m, y {y:.1f} m")
+            self._stop(int(i))
+
+    def _stop(self, i: int) -> None:
+        squad, place = self.fleet.of(i)
+        self.lost[i] = True
+        squad.command(place, ())
+        squad.scale[place] = 0.0
+        self.events.append(Event("lost", self.ids[i], data={"kind": "stop"}))
 
     def _sense(self, senses: Senses) -> None:
         """See and localise after a step; tell the guidance and, of robots that get no further, the director."""

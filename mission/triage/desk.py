@@ -14,7 +14,7 @@ from quarterdeck.mission.triage.chase import LEGS, Ways, expanding_square, strai
 from quarterdeck.mission.triage.machines import Row, step
 from quarterdeck.mission.triage.records import XY, Entry, Medic, Memory, Record, Uav, Ugv
 from quarterdeck.mission.triage.settings import Policy, Settings
-from quarterdeck.mission.triage.team import Team
+from quarterdeck.mission.triage.team import Robot, Team
 
 _EDGE = 2e-6  # m: what the world calls a meeting is in range here, whatever the rounding
 _KIND: dict[type, str] = {Ugv: "ugv", Uav: "uav", Medic: "medic"}
@@ -27,6 +27,7 @@ class Desk:
         "agents",
         "commands",
         "log",
+        "look",
         "mute",
         "out",
         "policy",
@@ -52,12 +53,20 @@ class Desk:
         self.out, self.tags = (memory.out, memory.tags) if memory else (frozenset(), frozenset())
         self.mute = memory.mute if memory else frozenset()
         self.log: list[Entry] = list(memory.log) if memory else []
+        self.look: Mapping[str, float] = memory.look if memory else {}
         self.commands: dict[str, Command] = {}
         self.replanned: set[str] = set()
 
     def memory(self) -> Memory:
         """Return what is to be kept until the next call."""
-        return Memory(self.agents, self.out, self.mute, self.tags, tuple(self.log))
+        at_work = any(record.moving for name, record in self.agents.items() if name not in self.out)
+        wake = min((t for name, t in self.look.items() if name not in self.out), default=inf) if at_work else inf
+        return Memory(self.agents, self.out, self.mute, self.tags, tuple(self.log), self.look, wake)
+
+    @property
+    def robots(self) -> dict[str, Robot]:
+        """The UGVs and UAVs by id."""
+        return {**self.team.ugvs, **self.team.uavs}
 
     def change(self, name: str, **changes: Any) -> None:
         """Put a changed record in the place of a member's record."""

@@ -14,6 +14,7 @@ from quarterdeck.mission.director import Command, Director, Event, State
 from quarterdeck.mission.triage import medic, uav, ugv
 from quarterdeck.mission.triage.board import compare_boards, first_board
 from quarterdeck.mission.triage.desk import Desk
+from quarterdeck.mission.triage.energy import watch_energy
 from quarterdeck.mission.triage.records import Belief, Medic, Memory, Report, Uav, Ugv
 from quarterdeck.mission.triage.settings import Policy, Settings
 from quarterdeck.mission.triage.team import Team
@@ -44,6 +45,7 @@ def triage(team: Team, policy: Policy, settings: Settings) -> Director:
             if desk.agents[name].moving and states[name].idle and name not in desk.commands and name not in desk.out:
                 _ROOM[type(desk.agents[name])].arrived(desk, name)
         _talk(desk, {(e.vehicle, e.subject) for e in events if e.kind == "met"})
+        watch_energy(desk)
         return desk.commands, desk.memory()
 
     return direct

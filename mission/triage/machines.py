@@ -1,7 +1,8 @@
 """The three state machines of Weaver et al. 2025, Figs 3 to 5, as tables: (state, event, action, next).
 
 The director looks up what comes next here and nowhere else; the diagrams in the docs are drawn from here. Rows that the
-figures do not show keep a reported casualty from being lost when somebody fails, or end the mission: they are `extra`.
+figures do not show keep a reported casualty from being lost when somebody fails, bring a robot home on what its battery
+has left, or end the mission: they are `extra`.
 """
 
 from collections.abc import Mapping
@@ -51,6 +52,11 @@ UGV = (
     Row("return", "casualty seen", "note it", "return"),
     Row("return", "urgent casualty seen", "note it, drive to it", "continued explore"),
     Row("return", "back where it left", "resume the path", "explore"),
+    *(
+        Row(state, "battery low", "drive home, past the rendezvous if it has to report", "home", extra=True)
+        for state in ("explore", "continued explore", "deliver", "wait", "seek", "return", "done")
+    ),
+    Row("home", "casualty seen", "note it", "home", extra=True),
 )
 
 UAV = (
@@ -64,6 +70,7 @@ UAV = (
     Row("deliver", "nobody to report to", "tell undeliverable", "return", extra=True),
     Row("return", "list received", "fly to the medic", "deliver"),
     Row("return", "arrived", "hover", "rendezvous"),
+    *(Row(state, "battery low", "fly home and land", "home", extra=True) for state in ("rendezvous", "deliver", "return")),
 )
 
 MEDIC = (

@@ -4,15 +4,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
-import numpy as np
-
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Scenario
 from quarterdeck.mission.triage.director import triage
 from quarterdeck.mission.triage.records import Entry, Memory
 from quarterdeck.mission.triage.search import Search
 from quarterdeck.mission.triage.settings import METHODS, Settings
-from quarterdeck.mission.triage.team import Team, make_team, targets
+from quarterdeck.mission.triage.sight import seen_by
+from quarterdeck.mission.triage.team import Team, field_of, make_team, targets
 from quarterdeck.mission.world import Fault, Run, run_world
 
 
@@ -125,7 +124,7 @@ def judge(scenario: Scenario, team: Team, method: str, settings: Settings, run: 
     searched = [e.time for e in memory.log if e.what == "state" and e.whom == "section searched"]
     end = run.end if run.reason else max([0.0, *searched, *(f.treated for f in fates if f.treated is not None)])
     told = {t.id: (t.x + t.data["error"][0], t.y + t.data["error"][1]) for t in seen}
-    reasons = _reasons(team, fates, memory, run)
+    reasons = _reasons(scenario, team, fates, memory, run)
     return Outcome(scenario, method, settings, seed, team, fates, memory.log, run, end, reasons, told)
 
 
@@ -164,13 +163,20 @@ def _fates(scenario: Scenario, log: Sequence[Entry], data: Mapping[str, Mapping[
     return tuple(fates)
 
 
-def _reasons(team: Team, fates: Sequence[Fate], memory: Memory, run: Run) -> tuple[str, ...]:
+def _reasons(scenario: Scenario, team: Team, fates: Sequence[Fate], memory: Memory, run: Run) -> tuple[str, ...]:
     reasons = [run.reason] if run.reason else []
-    reasons += [
-        f"{name} stopped before its section was searched, and nobody took it over"
-        for name in team.ugvs
-        if name in memory.out and name not in {e.about for e in memory.log if e.what == "searched"}
-    ]
+    searched, taken = ({e.about for e in memory.log if e.what == what} for what in ("searched", "takes over"))
+    home = {e.who: e.time for e in memory.log if e.what == "turns home"}
+    for name in team.ugvs:
+        if name not in searched and (name in memory.out or name in home):
+            went = "stopped" if name in memory.out else f"turned home for want of energy at {home[name]:,.0f} s,"
+            then = "who took it over did not finish it" if name in taken else "nobody took it over"
+            reasons.append(f"{name} {went} before its section was searched, and {then}")
+    if not searched >= team.ugvs.keys():
+        left = field_of(scenario).difference(seen_by(team, run.tracks)).area - team.search.missed
+        reasons += [f"{left:,.0f} m2 of the field were not searched"] if left >= 0.5 else []
+    if team.uavs and home.keys() >= team.uavs.keys() - memory.out and any(f.state == "found" for f in fates):
+        reasons += [f"{name} turned home for want of energy at {home[name]:,.0f} s" for name in team.uavs if name in home]
     if team.search.missed > 0:
         reasons.append(f"{team.search.missed:,.0f} m2 of the field cannot be seen from where the UGVs can go")
     for fate in fates:
@@ -185,8 +191,3 @@ def _reasons(team: Team, fates: Sequence[Fate], memory: Memory, run: Run) -> tup
         elif fate.state == "delivered":
             reasons.append(f"casualty {fate.id} ({fate.colour}) was not treated")
     return tuple(reasons)
-
-
-def track_at(track: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Return (m, 2) positions on a track (n, 3) at (m,) times."""
-    return np.column_stack([np.interp(times, track[:, 0], track[:, 1]), np.interp(times, track[:, 0], track[:, 2])])

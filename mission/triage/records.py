@@ -1,7 +1,8 @@
 """What each member of the team knows: the director's memory. Nothing passes between two records but in range."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from math import inf
 
 XY = tuple[float, float]
 
@@ -127,7 +128,7 @@ Record = Ugv | Uav | Medic
 @dataclass(frozen=True, slots=True)
 class Entry:
     """A line of the log. `what`: found, handed, delivered, treatment, treated, undeliverable, lost, heard again, searched,
-    takes over, state.
+    takes over, turns home, state.
     """
 
     time: float
@@ -142,7 +143,8 @@ class Entry:
 @dataclass(frozen=True, slots=True)
 class Memory:
     """All that the director keeps: records by id, who is `out` of the mission, whose devices are `mute`, `tags` on
-    casualties in treatment or treated (seen on the spot), log.
+    casualties in treatment or treated (seen on the spot), log; `look`, the seconds at which each robot looks at its battery
+    again, and `wake`, when the director is to be called for it.
     """
 
     agents: Mapping[str, Record]
@@ -150,3 +152,5 @@ class Memory:
     mute: frozenset[str] = frozenset()
     tags: frozenset[str] = frozenset()
     log: tuple[Entry, ...] = ()
+    look: Mapping[str, float] = field(default_factory=dict)
+    wake: float = inf

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from math import inf
 
 import numpy as np
 from shapely import MultiPolygon, Point
@@ -27,7 +28,7 @@ _APART = 4.2  # lengths between UGVs that wait side by side, so that one passes 
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """A UGV or UAV: `path` is what a UGV searches; `home` when a UAV is where, as (seconds, (x, y)), first to last.
+    """A UGV or UAV, `vehicle`: `path` is what a UGV searches; `home` when a UAV hovers where, as (seconds, (x, y)).
 
     What bodies add: `berth` is how far from the rendezvous a UGV waits, metres east and north; `standoff` how near it
     drives to a casualty, metres; `halt` how many seconds a UAV that looks for somebody stops where it changes course, so
@@ -35,6 +36,7 @@ class Robot:
     """
 
     id: str
+    vehicle: Vehicle
     start: XY
     speed: float
     sees: float
@@ -44,6 +46,12 @@ class Robot:
     berth: XY = (0.0, 0.0)
     standoff: float = 0.0
     halt: float = 0.0
+
+    @property
+    def power(self) -> Callable[[np.ndarray], np.ndarray] | None:
+        """The watts that it draws at (n,) speeds; None where it can be out for ever."""
+        limited = min(self.vehicle.battery, self.vehicle.endurance) < inf
+        return self.vehicle.model.power if limited else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +81,8 @@ class Team:
         """Return everybody for the world: UGVs, UAVs, medics."""
         on_the_spot = max(settings.medic_sees, 0.1)
         return [
-            *(Actor(u.id, *u.start, speed=u.speed, sees=u.sees) for u in self.ugvs.values()),
-            *(Actor(u.id, *u.start, z=u.z, speed=u.speed) for u in self.uavs.values()),
+            *(Actor(u.id, *u.start, speed=u.speed, sees=u.sees, power=u.power) for u in self.ugvs.values()),
+            *(Actor(u.id, *u.start, z=u.z, speed=u.speed, power=u.power) for u in self.uavs.values()),
             *(Actor(m, *xy, speed=settings.medic_speed, sees=on_the_spot) for m, xy in self.medics.items()),
         ]
 
@@ -109,7 +117,7 @@ def make_team(
     _check(scenario)
     spacing = scenario.spacing or settings.spacing
     sees = [u.range or settings.ugv_sees for u in ugvs]
-    field = as_multipolygon(scenario.site.area.intersection(scenario.site.navigable("ground")))
+    field = field_of(scenario)
     starts = tuple((float(u.start[0]), float(u.start[1])) for u in ugvs)
     if search is None:
         search = search_paths(field, ground, starts, spacing, min(sees), on_ground)
@@ -118,7 +126,7 @@ def make_team(
               for u, p in zip(ugvs, search.paths, strict=True)]  # fmt: skip
     berths = _berths(ugvs, search.paths, points) if bodies else [(0.0, 0.0)] * len(ugvs)
     robots = {
-        u.id: Robot(u.id, u.start, u.speed, s, path=r, berth=b, standoff=_STANDOFF * bodies)
+        u.id: Robot(u.id, u, u.start, u.speed, s, path=r, berth=b, standoff=_STANDOFF * bodies)
         for u, s, r, b in zip(ugvs, sees, routes, berths, strict=True)
     }
     homes: list[tuple[tuple[float, XY], ...]] = [
@@ -130,7 +138,7 @@ def make_team(
     return Team(
         ugvs=robots,
         uavs={
-            u.id: Robot(u.id, u.start, u.speed, 0.0, u.altitude, home=h, halt=_HALT * bodies)
+            u.id: Robot(u.id, u, u.start, u.speed, 0.0, u.altitude, home=h, halt=_HALT * bodies)
             for u, h in zip(used, homes, strict=True)
         },
         medics=dict(scenario.medics),
@@ -144,6 +152,11 @@ def make_team(
         in_air=ways_in(air),
         distances=_distances(on_foot),
     )
+
+
+def field_of(scenario: Scenario) -> MultiPolygon:
+    """Return what is to be searched: the areas, less what stands on them."""
+    return as_multipolygon(scenario.site.area.intersection(scenario.site.navigable("ground")))
 
 
 def targets(scenario: Scenario, settings: Settings, seed: int) -> list[Target]:

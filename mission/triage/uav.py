@@ -8,7 +8,7 @@ from quarterdeck.mission.mission import Waypoint
 from quarterdeck.mission.triage import medic
 from quarterdeck.mission.triage.chase import chase, intercept, meeting_time, predict
 from quarterdeck.mission.triage.desk import Desk
-from quarterdeck.mission.triage.records import Belief, Report, Uav
+from quarterdeck.mission.triage.records import XY, Belief, Report, Uav
 from quarterdeck.mission.triage.settings import RANK
 
 _MISSES = 3  # visits of a round robin in which a UGV was not found, after which it is taken for lost
@@ -28,7 +28,9 @@ def receive(desk: Desk, name: str, reports: tuple[Report, ...]) -> None:
 def arrived(desk: Desk, name: str) -> None:
     """At the rendezvous it hovers; where the medic should have been and was not found, it searches on."""
     me: Uav = desk.agents[name]
-    if me.state != "deliver":
+    if me.state == "home":
+        desk.send(name, ())
+    elif me.state != "deliver":
         desk.fire(name, "arrived")
         _hover(desk, name)
     elif me.sweeps < desk.settings.sweeps:
@@ -99,6 +101,20 @@ def go_home(desk: Desk, name: str) -> None:
         waypoints += [Waypoint(x, y, robot.z, speed=robot.speed, time=from_time) for x, y in corners]
         at = place
     desk.send(name, waypoints)
+
+
+def turn_home(desk: Desk, name: str) -> None:
+    """Fly home on what the battery has left, and land. It tells a medic who comes by; UGVs keep what it has not told."""
+    robot = desk.team.uavs[name]
+    if desk.fire(name, "battery low"):
+        way = [Waypoint(x, y, robot.z, speed=robot.speed) for x, y in way_home(desk, name)]
+        desk.send(name, [*way, replace(way[-1], z=0.0, leg="landing")])
+
+
+def way_home(desk: Desk, name: str) -> list[XY]:
+    """Return the way home through the air."""
+    vehicle, here = desk.team.uavs[name].vehicle, desk.here(name)
+    return list(desk.team.in_air(here, vehicle.home)) if vehicle.returns else [here]
 
 
 def _hover(desk: Desk, name: str) -> None:

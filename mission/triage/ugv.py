@@ -1,9 +1,11 @@
 """The UGV: explore, continued explore, deliver, wait, return (Fig. 3); seek, when the UAV does not come."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from math import hypot, inf
 
+from quarterdeck.mission.mission import Waypoint
 from quarterdeck.mission.triage import medic, uav
 from quarterdeck.mission.triage.board import compare_in_range, due, overdue, write_own
 from quarterdeck.mission.triage.chase import chase, meeting_time, predict
@@ -67,6 +69,8 @@ def arrived(desk: Desk, name: str) -> None:
             _wait(desk, name)
     elif me.state == "done":
         stand_by(desk, name)
+    elif me.state == "home":
+        desk.send(name, ())
     elif me.state == "wait":
         desk.change(name, relay_lost=desk.policy.receiver == "uav", sweeps=0)
         if desk.fire(name, "patience over"):
@@ -86,7 +90,7 @@ def meets_uav(desk: Desk, name: str, other: str) -> bool:
     me: Ugv = desk.agents[name]
     it: Uav = desk.agents[other]
     passing = desk.settings.rendezvous == "round-robin"
-    if desk.policy.receiver != "uav" or (me.state not in _REPORTING and not passing):
+    if desk.policy.receiver != "uav" or it.state == "home" or (me.state not in (*_REPORTING, "home") and not passing):
         return False
     carried = it.closed | it.told | {r.id for r, _ in it.load}
     news = tuple(r for r in me.reports if r.id not in carried)
@@ -116,13 +120,14 @@ def meets_uav(desk: Desk, name: str, other: str) -> bool:
 
 
 def meets_medic(desk: Desk, name: str, other: str) -> bool:
-    """Report to a medic himself: without a relay, or when it is lost, or who could not be told before.
+    """Report to a medic himself: without a relay, or when it is lost or its battery low, or who could not be told before.
 
     Return whether anything was said.
     """
     me: Ugv = desk.agents[name]
     direct = desk.policy.receiver == "medic" and (me.state in _REPORTING or desk.policy.everywhere)
-    if not direct and not (me.relay_lost and me.state in _REPORTING) and not (me.told and me.reports):
+    late = bool(me.reports) and (bool(me.told) or me.state == "home")
+    if not direct and not (me.relay_lost and me.state in _REPORTING) and not late:
         return False
     for r in me.reports:
         desk.note(name, "delivered", r.id, whom=other)
@@ -148,6 +153,30 @@ def resume(desk: Desk, name: str) -> None:
         desk.send(name, path)
     else:
         _drive(desk, name, [desk.here(name)])
+
+
+def turn_home(desk: Desk, name: str) -> None:
+    """Drive home on what the battery has left; who has something to report waits for a while at the rendezvous first."""
+    me: Ugv = desk.agents[name]
+    rest, left = _index(desk, name), desk.here(name) if me.state == "explore" else me.left
+    desk.change(name, rest=rest, left=left, around=())
+    if not desk.fire(name, "battery low"):
+        return
+    speed = desk.team.ugvs[name].speed
+    corners = _to_depot(desk, name) if me.reports else []
+    waiting = [Waypoint(x, y, speed=speed) for x, y in corners]
+    if waiting:
+        waiting[-1] = replace(waiting[-1], hold=desk.settings.linger)
+    onward = way_home(desk, name, corners)
+    desk.send(name, [*waiting, *(Waypoint(x, y, speed=speed) for x, y in onward)])
+
+
+def way_home(desk: Desk, name: str, corners: Sequence[XY] | None = None) -> list[XY]:
+    """Return the way home from where `corners` end; without any, by way of the rendezvous."""
+    vehicle = desk.team.ugvs[name].vehicle
+    via = _to_depot(desk, name) if corners is None else []
+    here = (via or corners or [desk.here(name)])[-1]
+    return [*via, *(desk.team.on_ground(here, desk.stand(name, vehicle.home)) if vehicle.returns else [here])]
 
 
 def stand_by(desk: Desk, name: str) -> None:

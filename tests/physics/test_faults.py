@@ -1,6 +1,7 @@
 """Faults: read, drawn, and doing to the vehicles what they say."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -177,3 +178,15 @@ def test_a_run_is_not_over_while_somebody_is_to_be_heard_again(mow) -> None:
     run = simulate(mow("husky"), director=director, faults=["comms:husky-1@1-30"], duration=60.0)
     assert sorted(heard) == [(30.0, "returned"), (30.0, "served")]
     assert run.trace.time[-1] < 32.0
+
+
+def test_an_empty_battery_stops_a_vehicle_and_is_told(mow) -> None:  # type: ignore[no-untyped-def]
+    """A rover with a third of the energy that its route needs stops on the way; the others go on."""
+    mission = mow("husky", count=2)
+    first, second = mission.vehicles
+    flat = replace(mission, vehicles=(replace(first, battery=mission.routes[0].energy / 3), second))
+    report = simulate(flat).report
+    assert [v.lost for v in report.vehicles] == [True, False]
+    assert [v.finished for v in report.vehicles] == [False, True]
+    assert report.vehicles[0].length < 0.6 * report.vehicles[1].length
+    assert [r for r in report.reasons if r.startswith(f"{first.id}: battery empty at")]

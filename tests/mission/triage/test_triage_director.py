@@ -17,9 +17,10 @@ from quarterdeck.mission.triage import outcome as outcome_module
 from quarterdeck.mission.triage.director import triage
 from quarterdeck.mission.triage.generate import generate, paper_team
 from quarterdeck.mission.triage.machines import MACHINES, START, as_markdown
-from quarterdeck.mission.triage.outcome import Outcome, run_triage, track_at
+from quarterdeck.mission.triage.outcome import Outcome, run_triage
 from quarterdeck.mission.triage.records import Medic
 from quarterdeck.mission.triage.settings import METHODS, RANK, Settings
+from quarterdeck.mission.triage.sight import track_at
 from quarterdeck.mission.world import Fault
 
 Size = tuple[int, int, int]
