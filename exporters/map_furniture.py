@@ -13,6 +13,8 @@ from shapely.geometry.base import BaseGeometry
 
 from quarterdeck.geo.frame import Frame
 
+NAME_SIZE = 6.5  # points
+
 
 def fill(chart: Axes, geometry: BaseGeometry, **style: Any) -> None:
     """Add a patch for each polygon of a geometry in metres, holes left out."""
@@ -24,7 +26,7 @@ def fill(chart: Axes, geometry: BaseGeometry, **style: Any) -> None:
 
 
 def graticule(chart: Axes, frame: Frame) -> None:
-    """Draw meridians and parallels at round minutes, named along the left and lower edges."""
+    """Draw meridians and parallels at round minutes, named along the left and lower edges where names have room."""
     (west, east), (south, north) = chart.get_xlim(), chart.get_ylim()
     edge = np.linspace(0.0, 1.0, 20)
     corners = np.array([(x, y) for x in (west, (west + east) / 2, east) for y in (south, (south + north) / 2, north)])
@@ -33,8 +35,14 @@ def graticule(chart: Axes, frame: Frame) -> None:
     lon0, lon1, lat0, lat1 = lons.min(), lons.max(), degrees[:, 1].min(), degrees[:, 1].max()
     chart.set_xticks([])
     chart.set_yticks([])
+    frame_box, dots = chart.get_window_extent(), chart.get_figure(root=True).dpi / 72  # type: ignore[union-attr]
     for low, high, across, first in ((lon0, lon1, (lat0, lat1), 0), (lat0, lat1, (lon0, lon1), 1)):
+        start, end = (west, east) if first == 0 else (south, north)
+        room = (frame_box.width if first == 0 else frame_box.height) / dots  # points
+        sides = "EW" if first == 0 else "NS"
         step = _round_step((high - low) / 5)
+        name = 0.62 * NAME_SIZE * max(len(_angle(value, sides, step)) for value in (low, high))  # a name's length, points
+        step = _round_step(max(step, 1.3 * name / room * (high - low)))
         ticks, labels = [], []
         for value in np.arange(math.ceil(low / step), math.floor(high / step) + 1) * step:
             other = across[0] + (across[1] - across[0]) * edge
@@ -45,10 +53,11 @@ def graticule(chart: Axes, frame: Frame) -> None:
             along, edge_at = (line[:, 0], south) if first == 0 else (line[:, 1], west)
             order = np.argsort(line[:, 1 - first])
             ticks.append(float(np.interp(edge_at, line[order, 1 - first], along[order])))
-            labels.append(_angle(value, "EW" if first == 0 else "NS", step))
+            inside = abs((ticks[-1] - start) / (end - start) - 0.5) < 0.5 * (1.0 - name / room)
+            labels.append(_angle(value, sides, step) if inside else "")
         axis = chart.xaxis if first == 0 else chart.yaxis
         axis.set_ticks(ticks, labels)
-    chart.tick_params(labelsize=6.5, length=2, color="#90a4ae")
+    chart.tick_params(labelsize=NAME_SIZE, length=2, color="#90a4ae")
     for label in chart.get_yticklabels():
         label.set(rotation=90, va="center")
 

@@ -69,7 +69,10 @@ def picture(
 
 
 def _view(chart: Axes, mission: Mission, trace: Trace | None, aspect: float) -> None:
-    """Set the limits: all routes, tracks and areas, with a margin, filling the frame; far parts of the site are cut."""
+    """Set the limits: all routes, tracks and areas, with a margin, filling the frame; far parts of the site are cut.
+
+    The lower margin has room for the scale bar: it hides no track.
+    """
     points = [route.xyz[:, :2] for route in mission.routes]
     points += [np.column_stack([trace.x.ravel(), trace.y.ravel()])] if trace is not None else []
     points += [shapely.get_coordinates(area.polygon) for area in mission.site.areas]
@@ -78,7 +81,8 @@ def _view(chart: Axes, mission: Mission, trace: Trace | None, aspect: float) -> 
         points = [shapely.get_coordinates(mission.site.operating)]
     every = np.vstack(points)
     low, high = every.min(axis=0), every.max(axis=0)
-    centre, size = (low + high) / 2, np.maximum(high - low, 10.0) * 1.10
+    centre, size = (low + high) / 2, np.maximum(high - low, 10.0)
+    centre, size = centre - (0.0, 0.02 * size[1]), size * (1.10, 1.14)
     box = chart.get_position()
     shape = box.width / box.height * aspect
     size = np.array([max(size[0], size[1] * shape), max(size[1], size[0] / shape)])

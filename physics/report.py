@@ -368,7 +368,11 @@ def _reasons(
         )
     if figures["time_planned"] > 0:
         ratio = figures["time"] / figures["time_planned"]
-        over("delay", ratio, f"took {figures['time']:.0f} s, planned {figures['time_planned']:.0f} s")
+        over(
+            "delay",
+            ratio,
+            f"took {figures['time']:.0f} s, planned {figures['time_planned']:.0f} s, allowed {allowed['delay']:g} times that",
+        )
     return reasons
 
 

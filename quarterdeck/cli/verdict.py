@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from quarterdeck.physics.task_report import TaskReport
 
 
+POINTS = "points that turn at once and give way to nobody"  # the fast world, in plain words
+
+
 def print_report(mission: Mission, report: Report, *, how: str = "simulated") -> None:
     """Print the verdict and its figures on standard error."""
     from rich.box import SIMPLE_HEAD
@@ -23,8 +26,9 @@ def print_report(mission: Mission, report: Report, *, how: str = "simulated") ->
 
     screen = console()
     table = Table(title=f"{mission.name}: {how}", title_justify="left", box=SIMPLE_HEAD)
-    for column in ("vehicle", "time", "energy", "off track", "obstacle", "vehicle"):
-        table.add_column(column, justify="left" if not table.columns else "right", no_wrap=True)
+    table.add_column("vehicle", overflow="fold")
+    for column in ("time", "energy", "off track", "to obstacle", "to vehicle"):
+        table.add_column(column.replace(" ", "\n"), justify="right", no_wrap=True)
     for v in report.vehicles[:60]:
         table.add_row(
             v.id,
@@ -45,7 +49,7 @@ def print_report(mission: Mission, report: Report, *, how: str = "simulated") ->
         words.append(f"tasks {figures['tasks_served']} of {figures['tasks_planned']} served")
     if (fast := figures.get("time_fast")) is not None:
         tasks = f", {figures['tasks_served_fast']} tasks" if figures["tasks_planned"] else ""
-        words.append(f"took {minutes(figures['time'] or 0.0)}, in the fast world {minutes(fast)}{tasks}")
+        words.append(f"took {minutes(figures['time'] or 0.0)} ({minutes(fast)}{tasks} if all were {POINTS})")
     words.append(f"collisions {figures['collisions']}")
     words.append(f"finished {figures['finished']} of {len(report.vehicles)}")
     if figures["lost"]:
@@ -62,6 +66,8 @@ def print_report(mission: Mission, report: Report, *, how: str = "simulated") ->
         print_reason(screen, "note", note)
     if report.triage is not None:
         _print_triage(screen, report.triage)
+        most = report.limits["delay"]
+        screen.print(f"as points: if all were {POINTS}; the run may take {most:g} times as long (--limit delay=...)")
     for reason in report.reasons:
         print_reason(screen, "failed", reason)
     if report.passed:
@@ -69,14 +75,14 @@ def print_report(mission: Mission, report: Report, *, how: str = "simulated") ->
 
 
 def _print_triage(screen: Console, triage: Mapping[str, Any]) -> None:
-    """Print what became of the casualties, the fast world's beside the run's."""
+    """Print what became of the casualties, as reckoned with points beside the run's."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
     from quarterdeck.cli.triage import ROWS
 
     table = Table(title=f"triage, {triage['method']}", title_justify="left", box=SIMPLE_HEAD)
-    for column in ("", "fast world", "this run"):
+    for column in ("", "as points", "this run"):
         table.add_column(column, justify="right" if column else "left")
     for name, (label, form) in ROWS.items():
         table.add_row(label, *("-" if value is None else form.format(value) for value in triage["figures"][name]))
