@@ -371,7 +371,7 @@ def _reasons(
         over(
             "delay",
             ratio,
-            f"took {figures['time']:.0f} s, planned {figures['time_planned']:.0f} s, allowed {allowed['delay']:g} times that",
+            f"took {figures['time']:.0f} s, planned {figures['time_planned']:.0f} s (allowed: {allowed['delay']:g} times)",
         )
     return reasons
 

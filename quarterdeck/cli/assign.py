@@ -96,10 +96,15 @@ def command(
     from rich.progress import Progress, TextColumn, TimeElapsedColumn
 
     from quarterdeck.api import assign, plan_text, read_scenario
+    from quarterdeck.cli.advice import far_off, print_notes
+    from quarterdeck.geo.geojson import opened
     from quarterdeck.mission.twin import map_scenario
 
     tell_compiling()
-    scenario = read_scenario(site)
+    document = opened(site)
+    scenario = read_scenario(document)
+    if not as_json:
+        print_notes(far_off(scenario, document))
     twin = None
     if map_file is not None:
         scenario, twin = map_scenario(scenario, map_file, map_origin)

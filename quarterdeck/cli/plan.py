@@ -75,10 +75,15 @@ def command(
 ) -> int:
     """Plan a mission that covers the areas of SITE, a GeoJSON file (- reads standard input), and write it as a PLAN."""
     from quarterdeck.api import default_method, plan, plan_text, read_scenario
+    from quarterdeck.cli.advice import far_off, print_notes
+    from quarterdeck.geo.geojson import opened
 
     tell_compiling()
     given = {name: value for name, value in options.items() if value is not None}
-    scenario = read_scenario(site)
+    document = opened(site)
+    scenario = read_scenario(document)
+    if not as_json:
+        print_notes(far_off(scenario, document))
     method = method or default_method(scenario)
     for name in given:
         if name not in OPTIONS.get(method, given):

@@ -78,19 +78,19 @@ def command(
 
 
 def _write_gaps(mission: Mission, run: Run, gaps: str, force: bool) -> None:
-    """Write what was left uncovered, and tell what of it is not worth a track."""
+    """Write what was left uncovered, and tell what of it is not worth a track; a site has no area where nothing was."""
     from quarterdeck.geo.writer import site_text
     from quarterdeck.mission.gaps import SLIVER, gap_site
     from quarterdeck.physics.observed import missed
 
     site, slivers = gap_site(mission, missed(mission, run.trace))
     screen = console()
+    emit(site_text(site), gaps, force=force)
     if site.site.areas:
-        emit(site_text(site), gaps, force=force)
         area = sum(a.polygon.area for a in site.site.areas)
         print_reason(screen, "gaps", f"{len(site.site.areas)} of {area:,.0f} m2 in all: {gaps}")
     else:
-        print_reason(screen, "gaps", f"none; {gaps} is not written")
+        print_reason(screen, "gaps", f"none: nothing is left to plan, {gaps} has no area")
     if slivers.area > 0:
         narrow = f"{SLIVER:g} of the {'spacing' if mission.spacing else 'range'}"
         print_reason(screen, "gaps", f"{slivers.area:,.0f} m2 in slivers narrower than {narrow} are left out")

@@ -74,13 +74,15 @@ def test_gaps_are_planned_again(flown, tmp_path, capsys):
     assert read_plan(str(tmp_path / "infill.geojson")).figures["poc"] > 0.8
 
 
-def test_nothing_missed_writes_no_gaps(flown, tmp_path, capsys):
-    """A perfect flight leaves nothing that is worth a track."""
+def test_nothing_missed_leaves_nothing_to_plan(flown, tmp_path, capsys):
+    """A perfect flight leaves a site without an area, in the place of older gaps, and `plan` says that it has none."""
     plan, log = flown
     gaps = tmp_path / "gaps.geojson"
-    run("report", plan, "--track", log, "--gaps", gaps)
+    gaps.write_text("older gaps", encoding="utf-8")
+    run("report", plan, "--track", log, "--gaps", gaps, "--force")
     assert "gaps: none" in capsys.readouterr().err
-    assert not gaps.exists()
+    assert run("plan", gaps, "-o", tmp_path / "infill.geojson") == 2
+    assert 'no feature has the role "area"' in capsys.readouterr().err
 
 
 def test_replan_from_logs_and_from_the_report(flown, tmp_path, capsys):
