@@ -112,7 +112,7 @@ def test_replan_from_logs_and_from_the_report(flown, tmp_path, capsys):
         (["report", "PLAN", "--track", "uav-1=LOG#x"], "no 'x' in the file"),
         (["report", "PLAN", "--track", "LOG", "--start", "noon"], "no time such as"),
         (["replan", "PLAN"], "--at is missing"),
-        (["replan", "PLAN", "--state", "PLAN"], "no report with a state"),
+        (["replan", "PLAN", "--state", "PLAN"], "is a PLAN; `check`"),
         (["replan", "PLAN", "--track", "uav-1=LOG"], "no track given"),
         (["replan", "PLAN", "--track", "LOG", "--state", "PLAN"], "give one of them"),
         (["replan", "PLAN", "--at", "5", "--start", "2026-06-01"], "needs --track"),
