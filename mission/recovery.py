@@ -26,6 +26,7 @@ from quarterdeck.mission.mission import Mission, Route, Waypoint
 from quarterdeck.mission.progress import Progress, surveyed
 from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.replan import replan
+from quarterdeck.mission.told import Telling, passed
 from quarterdeck.mission.triage.plan import METHOD
 
 BERTH = 4.0  # lengths from its end: so near, whoever launches and recovers the vehicles clears the way
@@ -43,7 +44,8 @@ class _Memory:
     they found no way, `undone` what earlier plans told could not be done. `untried` have not been heard of since they were
     told of the plan: how far they say to have come is how far they had come by the one before it. `sent` are the waypoints
     that each was commanded last, `serving` the task that it is at by them, and since when. `wrecks` are the ids that those
-    who were given up have as obstacles, by vehicle, `found` the ids of what robots have found.
+    who were given up have as obstacles, by vehicle, `found` the ids of what robots have found. `tellings` are
+    all new routes told so far.
     """
 
     mission: Mission
@@ -64,6 +66,7 @@ class _Memory:
     serving: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     wrecks: Mapping[str, str] = field(default_factory=dict)
     found: frozenset[str] = frozenset()
+    tellings: tuple[Telling, ...] = ()
 
 
 def recovering(mission: Mission, *, delay: float = 0.0, tell: Tell | None = None) -> Director:
@@ -194,7 +197,28 @@ def _replanned(
         serving={v: work for v, work in now.serving.items() if v not in told},
         wrecks={v: i for v, i in now.wrecks.items() if v not in afloat} | dict(zip(new, ids, strict=False)),
         found=frozenset(ids[len(new) :]) if found else now.found,
+        tellings=(*now.tellings, *(_telling(now, time, states[v], route, after) for v, route in told.items())),
     )
+
+
+def _telling(now: _Memory, time: float, state: State, route: Route, plan: Mission) -> Telling:
+    """Return that a vehicle is told a route of a new plan, with how far it has come on the one that it had."""
+    had, place = now.following[route.vehicle], (state.x, state.y, state.z)
+    if route.vehicle in now.untried:
+        reached = 1
+    elif plan.method == "assign":  # its commands are parts of the route
+        done = [i + 1 for i, w in enumerate(had.waypoints) if w.task and now.served.get(w.task) == route.vehicle]
+        reached = max(passed(had, place, time - now.since), *done, 1)
+    else:
+        reached = min(state.reached + 1, len(had.waypoints))
+    return Telling(time, route, place, reached, state.energy_used, plan.guards)
+
+
+def tellings(memory: Any) -> tuple[Telling, ...]:
+    """Return the new routes that the director with this `memory` has told vehicles in a run, in order."""
+    if isinstance(memory, Contact):
+        return tellings(memory.inner)
+    return memory.tellings if isinstance(memory, _Memory) else ()
 
 
 def undone(memory: Any) -> tuple[Reason, ...]:

@@ -12,8 +12,8 @@ REACH = 2.0  # m, or the vehicle's length: so near to a task it is done
 EARLY = 1.0  # s by which a service may fall short: logs are no finer
 
 
-def served_tasks(mission: Mission, tracks: Sequence[Track]) -> dict[str, float]:
-    """Return when each task, or guard's stop, was done, seconds since the mission's start, by whichever vehicle.
+def served_tasks(mission: Mission, tracks: Sequence[Track]) -> dict[str, tuple[float, str]]:
+    """Return when each task, or guard's stop, was done, seconds since the mission's start, and by which vehicle.
 
     Done is what a vehicle that can do it stayed near for as long as its route holds there, after all that it comes after.
     """
@@ -41,7 +41,7 @@ def served_tasks(mission: Mission, tracks: Sequence[Track]) -> dict[str, float]:
                     found += [(t, vehicle.id) for t in _stayed(track, vehicle, stops[name], since)]
             if found:
                 done[name] = min(found)
-    return {name: when for name, (when, _) in done.items()}
+    return done
 
 
 def _stayed(track: Track, vehicle: Vehicle, stop: Waypoint, since: float) -> list[float]:

@@ -43,29 +43,21 @@ def report_tracks(
     """
     followed = [follow(mission, t) for t in record.tracks]
     trace, notes = observed_trace(mission, record.tracks, followed)
+    served = served_tasks(mission, record.tracks)
     arrived = {t.vehicle for t in record.tracks if np.isfinite(t.arrived)}
     report = measure(
         mission,
         trace,
         finished=[v.id in arrived for v in mission.vehicles],
         aground=[False] * len(mission.vehicles),
-        served=served_tasks(mission, record.tracks),
+        served={task: when for task, (when, _) in served.items()},
+        servers={task: vehicle for task, (_, vehicle) in served.items()},
         limits=limits or {},
         settings=settings or {},
         trouble=[str(r) for r in record.reasons],
         notes=(*record.notes, *notes),
     )
     return Run(trace, report)
-
-
-def tracks_of(trace: Trace) -> tuple[Track, ...]:
-    """Return a simulated run's trace as tracks."""
-    nothing = np.zeros(len(trace.time), bool)
-    columns = ("x", "y", "z", "heading", "speed", "energy")
-    return tuple(
-        Track(vehicle, trace.time, **{n: getattr(trace, n)[:, i] for n in columns}, broken=nothing)
-        for i, vehicle in enumerate(trace.vehicles)
-    )
 
 
 def with_state(mission: Mission, report: Report, tracks: Sequence[Track]) -> Report:

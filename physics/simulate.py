@@ -15,7 +15,9 @@ from quarterdeck.mission.director import Director
 from quarterdeck.mission.fast import run_fast
 from quarterdeck.mission.inspection import default_director
 from quarterdeck.mission.mission import Mission
-from quarterdeck.mission.recovery import undone
+from quarterdeck.mission.recovery import tellings, undone
+from quarterdeck.mission.served import served_tasks
+from quarterdeck.mission.told import as_told
 from quarterdeck.mission.triage.plan import METHOD, run_plan
 from quarterdeck.physics.faults import in_fast_world, read_faults
 from quarterdeck.physics.mapping import agreement
@@ -40,6 +42,7 @@ class Run:
     triage: Compared | None = None  # of a triage mission: what became of its casualties
     site: Site | None = None  # what was there
     map: Occupancy | None = None  # what robots that drew a map made of it
+    told: Mission | None = None  # the plan as its vehicles were told it, by a director that replans
 
 
 def simulate(
@@ -96,7 +99,7 @@ def simulate(
     fast = run_fast(mission, expected, in_fast_world(befalling), until=until) if expected and not triage else None
     known, director = mission.site, director or default_director(mission)
     there = known.obstacles if sensing.world is None else sensing.world
-    mission = replace(mission, site=replace(known, obstacles=(*there, *sensing.unmapped)))
+    plan, mission = mission, replace(mission, site=replace(known, obstacles=(*there, *sensing.unmapped)))
     cut = ""
     with open_world(step) as world:
         air = np.array([*wind, 0.0])
@@ -144,19 +147,24 @@ def simulate(
         "unmapped": [o.id for o in sensing.unmapped],
         "world": None if sensing.world is None else [o.id for o in sensing.world],
     }
+    told = as_told(plan, tellings(run.memory))
+    served, servers = run.served, run.servers
+    if told is not plan and plan.method == "guards":  # each plan numbers its guards anew
+        found = served_tasks(told, trace.tracks())
+        served, servers = {task: when for task, (when, _) in found.items()}, {task: who for task, (_, who) in found.items()}
     report = measure(
-        mission,
+        mission if compared else replace(told, site=mission.site),
         trace,
         finished=run.finished.tolist(),
         aground=run.aground.tolist(),
-        served=run.served,
+        served=served,
         limits=limits or {},
         settings=settings,
         lost=run.lost.tolist(),
         trouble=[*run.trouble, *(compared.driven.reasons if compared else ())],
         localisation=run.senses.report() if run.senses else None,
         triage=compared.document() if compared else None,
-        servers=run.servers,
+        servers=servers,
         undone=undone(run.memory),
         fast=fast,
     )
@@ -164,7 +172,7 @@ def simulate(
     if sensing.mapping and run.router is not None:
         made = replace(run.router.shared.occupancy(), place=(mission.frame.lon, mission.frame.lat))
         report = replace(report, figures={**report.figures, **agreement(made, mission.site)})
-    return Run(trace, report, compared, mission.site, made)
+    return Run(trace, report, compared, mission.site, made, told)
 
 
 def _check(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from quarterdeck.geo.frame import Frame
+from quarterdeck.mission.track import Track
 
 UNKNOWN = -1  # kind of a leg: where the vehicle was is not known (a gap in its log)
 
@@ -54,6 +55,15 @@ class Trace:
         columns = {field.name: getattr(self, field.name) for field in fields(self)[1:]}
         np.savez(buffer, vehicles=np.array(self.vehicles), origin=np.array([frame.lon, frame.lat]), **columns)
         return buffer.getvalue()
+
+    def tracks(self) -> tuple[Track, ...]:
+        """Return it as the tracks of its vehicles."""
+        nothing = np.zeros(len(self.time), bool)
+        columns = ("x", "y", "z", "heading", "speed", "energy")
+        return tuple(
+            Track(vehicle, self.time, **{n: getattr(self, n)[:, i] for n in columns}, broken=nothing)
+            for i, vehicle in enumerate(self.vehicles)
+        )
 
     def known(self, column: int) -> list[slice]:
         """Return the unbroken runs of samples at which it is known where the vehicle in `column` was."""

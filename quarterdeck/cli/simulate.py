@@ -74,6 +74,9 @@ class Limit(click.ParamType):
 @writes("--snapshots", help="Draw the field of a triage plan at telling moments as PNG.")
 @writes("--casualties", help="Write what became of a triage plan's casualties, GeoJSON.")
 @writes("--trace", help="Write every sample of the run (NPZ).")
+@writes(
+    "--told", metavar="PLAN", help="Write the plan as it was told in the run (with --recover): for `report --track TRACE`."
+)
 @click.option("--current", type=Vector(), default="0,0", show_default=True, help="Water's motion, m/s east and north.")
 @click.option("--wind", type=Vector(), default="0,0", show_default=True, help="Mean wind, m/s towards east and north.")
 @click.option("--gusts", type=Real(min=0), default=0.0, show_default=True, help="Standard deviation of gusts, m/s.")
@@ -121,6 +124,7 @@ def command(
     snapshots: str | None,
     casualties: str | None,
     trace: str | None,
+    told: str | None,
     as_json: bool,
     time_limit: float | None,
     force: bool,
@@ -132,6 +136,8 @@ def command(
     """
     from quarterdeck.geo.deadline import limited
 
+    if told and not options["recover"]:
+        raise InputError("--told needs --recover: without it the plan is told as it is")
     tell_compiling()
     with limited(time_limit, interruptible=True) as limit:
         mission, run = execute(**options, casualties=bool(snapshots or casualties))
@@ -141,10 +147,14 @@ def command(
         write_map(run.map, Path(options["map_file"]), force=force)
     if trace:
         emit(run.trace.to_bytes(mission.frame), trace, force=force)
-    if report or as_json:
-        from quarterdeck.physics.observed import tracks_of, with_state
+    if told and run.told:
+        from quarterdeck.mission.planfile import plan_text
 
-        run = replace(run, report=with_state(mission, run.report, tracks_of(run.trace)))
+        emit(plan_text(run.told), told, force=force)
+    if report or as_json:
+        from quarterdeck.physics.observed import with_state
+
+        run = replace(run, report=with_state(mission, run.report, run.trace.tracks()))
     if report:
         emit(run.report.to_json(), report, force=force)
     if rrd:

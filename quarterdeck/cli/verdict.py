@@ -48,7 +48,7 @@ def print_report(mission: Mission, report: Report, *, how: str = "simulated") ->
     if figures["tasks_planned"]:
         words.append(f"tasks {figures['tasks_served']} of {figures['tasks_planned']} served")
     if (fast := figures.get("time_fast")) is not None:
-        tasks = f", {figures['tasks_served_fast']} tasks" if figures["tasks_planned"] else ""
+        tasks = f", {figures['tasks_served_fast']} tasks" if report.tasks else ""
         words.append(f"took {minutes(figures['time'] or 0.0)} ({minutes(fast)}{tasks} if all were {POINTS})")
     words.append(f"collisions {figures['collisions']}")
     words.append(f"finished {figures['finished']} of {len(report.vehicles)}")

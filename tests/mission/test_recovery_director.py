@@ -51,19 +51,24 @@ def test_survivors_cover_the_rest(site, fault):
 
 
 def test_a_wreck_is_an_obstacle_until_it_is_heard_of_and_what_the_site_has_stays():
-    """A lost robot is in the others' way; when it is back the site is as it was, with an obstacle of a wreck's name."""
+    """A lost robot is in the others' way; back, it goes on from where it is, and the site has its own obstacles again."""
     mission = plan("plant_yard")
     own = replace(mission.site.obstacles[0], id="wreck of ugv-1")
     mission = replace(mission, site=replace(mission.site, obstacles=(own, *mission.site.obstacles[1:])))
     told = []
-    director = recovering(mission, tell=lambda _, after: told.append({o.id for o in after.site.obstacles}))
-    middle = {r.vehicle: r.waypoints[len(r.waypoints) // 2] for r in mission.routes}
-    states = {v: State(w.x, w.y) for v, w in middle.items()}
-    _, memory = director(0.0, states, (), None)
-    _, memory = director(100.0, states, (Event("lost", "ugv-1"),), memory)
-    _, memory = director(200.0, states, (Event("returned", "ugv-1"),), memory)
+    director = recovering(mission, tell=lambda _, after: told.append(after))
+
+    def states(part):
+        places = {r.vehicle: r.waypoints[int(part * len(r.waypoints))] for r in mission.routes}
+        return {v: State(w.x, w.y) for v, w in places.items()}
+
+    _, memory = director(0.0, states(0.0), (), None)
+    _, memory = director(100.0, states(0.3), (Event("lost", "ugv-1"),), memory)
+    _, memory = director(200.0, states(0.5), (Event("returned", "ugv-1"),), memory)
     before = {o.id for o in mission.site.obstacles}
-    assert told == [before | {"wreck of ugv-1 (2)"}, before]
+    assert [{o.id for o in after.site.obstacles} for after in told] == [before | {"wreck of ugv-1 (2)"}, before]
+    route = next(r for r in told[1].routes if r.vehicle == "ugv-1")
+    assert (route.waypoints[0].x, route.waypoints[0].y) == (states(0.5)["ugv-1"].x, states(0.5)["ugv-1"].y)
 
 
 def test_false_alarm_changes_nothing():

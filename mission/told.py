@@ -1,0 +1,109 @@
+"""The plan as it was told in a run: of each route what was driven before it was replaced, then what replaced it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import dist
+
+import numpy as np
+
+from quarterdeck.mission.mission import Guard, Mission, Route, Waypoint
+
+SAME = 0.5  # m: legs so much farther away than the nearest may be the one that a vehicle is on
+
+
+@dataclass(frozen=True, slots=True)
+class Telling:
+    """A vehicle is told a new route, `time` seconds after the mission's start, of a plan with these `guards`.
+
+    It is at `place`, (x, y, z) metres, has passed `reached` waypoints of the route that it had, and used `energy` Wh.
+    """
+
+    time: float
+    route: Route
+    place: tuple[float, float, float]
+    reached: int
+    energy: float
+    guards: tuple[Guard, ...] = ()
+
+
+def passed(route: Route, place: tuple[float, float, float], time: float) -> int:
+    """Return how many waypoints of a route a vehicle has passed that is at `place`, on the leg that is nearest to it.
+
+    Of several it is on that which it is to be on nearest to `time`, seconds of the route.
+    """
+    points = route.xyz
+    if len(points) < 2:
+        return len(points)
+    step, off = np.diff(points, axis=0), np.array(place) - points[:-1]
+    part = np.clip((off * step).sum(axis=1) / np.maximum((step**2).sum(axis=1), 1e-12), 0.0, 1.0)
+    away = np.linalg.norm(off - part[:, None] * step, axis=1)
+    leave, come = (np.array([w.time for w in ws]) for ws in (route.waypoints[:-1], route.waypoints[1:]))
+    late = np.abs(leave + part * (come - leave) - time)
+    return 1 + int(np.argmin(np.where(away <= away.min() + SAME, late, np.inf)))
+
+
+def as_told(mission: Mission, told: Sequence[Telling]) -> Mission:
+    """Return the mission with the routes that its vehicles were told in a run, one after the other, times from its start.
+
+    Who was told nothing has the route that it had: it may not have heard that others are to do the rest of it. A task is on
+    the route to which it was given last.
+    """
+    if not told:
+        return mission
+    guards = list(mission.guards)
+    routes = {r.vehicle: r for r in mission.routes}
+    begins = dict.fromkeys(routes, 0)  # the waypoint at which the route that was told last begins
+    given = {w.task: r.vehicle for r in mission.routes for w in r.waypoints if w.task}
+    for telling in told:
+        name, new = telling.route.vehicle, _renumbered(telling, guards)
+        given |= {w.task: name for w in new if w.task}
+        had = routes[name].waypoints
+        before = had[: begins[name] + telling.reached]
+        under_way = had[min(len(before), len(had) - 1)]
+        time = max(telling.time, _planned(before[-1], under_way, telling.place))
+        x, y, z = telling.place
+        here = replace(under_way, x=x, y=y, z=z, hold=new[0].hold, time=time, task=new[0].task)
+        ahead = [replace(w, time=w.time + time) for w in new[1:]]
+        routes[name] = Route(name, (*before, here, *ahead), telling.energy + telling.route.energy)
+        begins[name] = len(before)
+    routes = {name: replace(r, waypoints=tuple(_of(name, w, given) for w in r.waypoints)) for name, r in routes.items()}
+    passes = {w.task: (v, i) for v, r in routes.items() for i, w in enumerate(w for w in r.waypoints if w.task)}
+    whose = [passes.get(f"guard-{i}", (None, None)) for i in range(len(guards))]
+    return replace(
+        mission,
+        routes=tuple(routes.values()),
+        guards=tuple(replace(g, vehicle=v, turn=turn) for g, (v, turn) in zip(guards, whose, strict=True)),
+        parameters={**mission.parameters, "told_at": sorted({t.time for t in told})},
+        figures={
+            **mission.figures,
+            "makespan": max(r.duration for r in routes.values()),
+            "energy": sum(r.energy for r in routes.values()),
+        },
+    )
+
+
+def _planned(last: Waypoint, under_way: Waypoint, place: tuple[float, float, float]) -> float:
+    """Return when a vehicle was to be at `place` on its way to a waypoint: it may have come there sooner."""
+    length = dist((last.x, last.y, last.z), (under_way.x, under_way.y, under_way.z))
+    left = last.time + last.hold
+    part = min(1.0, dist((last.x, last.y, last.z), place) / length) if length > 0 else 0.0
+    return left + part * (under_way.time - left)
+
+
+def _of(vehicle: str, waypoint: Waypoint, given: Mapping[str, str]) -> Waypoint:
+    """Return a waypoint without its task where that was given to another vehicle since."""
+    here = waypoint.task is None or given[waypoint.task] == vehicle
+    return waypoint if here else replace(waypoint, task=None)
+
+
+def _renumbered(telling: Telling, guards: list[Guard]) -> list[Waypoint]:
+    """Return the waypoints of a new route; where they are guards' these are added to `guards`, and have their numbers."""
+    names = {f"guard-{i}": g for i, g in enumerate(telling.guards)}
+    waypoints = []
+    for w in telling.route.waypoints:
+        if w.task in names:
+            guards.append(names[w.task])
+            waypoints.append(replace(w, task=f"guard-{len(guards) - 1}"))
+        else:
+            waypoints.append(w)
+    return waypoints
