@@ -23,6 +23,7 @@ from quarterdeck.mission.world import Actor, Target
 _MOVES = 30.0  # s between two places of a moving rendezvous
 _HALT = 1.0  # s
 _STANDOFF = 1.5  # m
+_ABOVE = 3.0  # m, at the most, that a UAV flies above the one before it: they hover at one rendezvous
 _APART = 4.2  # lengths between UGVs that wait side by side, so that one passes between two others
 
 
@@ -92,9 +93,9 @@ def make_team(
 ) -> Team:
     """Return the team of a scenario for a method; `search` gives the UGVs other paths than their tours.
 
-    With `bodies` nobody is a point: medics keep clear of walls, UGVs wait side by side around the rendezvous. Raises
-    InputError, in one line, if there is no UGV or medic, no UAV for a method that needs one, or a casualty, medic or
-    rendezvous is where nobody can get.
+    With `bodies` nobody is a point: medics keep clear of walls, UGVs wait side by side around the rendezvous, UAVs one
+    above the other. Raises InputError, in one line, if there is no UGV or medic, no UAV for a method that needs one, or a
+    casualty, medic or rendezvous is where nobody can get.
     """
     if method not in METHODS:
         raise InputError(f"unknown method {method!r}; use one of {', '.join(METHODS)}")
@@ -135,11 +136,13 @@ def make_team(
     if settings.rendezvous == "moving" and points:
         homes = [_moving(robots, ground) or homes[0]] * len(uavs)
     used = uavs if policy.receiver == "uav" else []
+    room = min((u.ceiling - u.altitude for u in used), default=0.0) / max(len(used), 1)
+    step = min(_ABOVE, max(room, 0.0)) * bodies
     return Team(
         ugvs=robots,
         uavs={
-            u.id: Robot(u.id, u, u.start, u.speed, 0.0, u.altitude, home=h, halt=_HALT * bodies)
-            for u, h in zip(used, homes, strict=True)
+            u.id: Robot(u.id, u, u.start, u.speed, 0.0, u.altitude + i * step, home=h, halt=_HALT * bodies)
+            for i, (u, h) in enumerate(zip(used, homes, strict=True))
         },
         medics=dict(scenario.medics),
         search=search,
