@@ -25,6 +25,7 @@ from quarterdeck.physics.seen import unseen, whole_tracks
 from quarterdeck.physics.simulate import Run
 
 UNSEEN = 0.005  # of what guards were to see: tracks cut corners
+BLIND = 5.0  # m off, where fixes fail for a while
 MARGIN = 1.25  # times what a trip takes by the plan, before it is held against those who did not make it
 
 
@@ -81,12 +82,16 @@ def _returns(case: Any, run: Run, watched: Any) -> list[str]:
         # Who is never heard again does what it was told last: it may wait where it was to hear of others.
         home = watched.ends.get(v.id, vehicle.home) if v.id in silent else moved.get(v.id, vehicle.home)
         away = np.hypot(run.trace.x[-1, i] - home[0], run.trace.y[-1, i] - home[1])
-        blind = 5.0 if any(f.kind == "gnss" for f in case.faults) else 0.0  # m: receivers have errors then
-        if not v.finished or away > 4.0 * vehicle.model.length + blind:
+        if not v.finished or away > 4.0 * vehicle.model.length + _blind(case):
             wrong.append(f"{v.id} is {away:.1f} m from home at the end" + (", not done" if not v.finished else ""))
         if v.energy > vehicle.battery:
             wrong.append(f"{v.id} used {v.energy:.1f} Wh of {vehicle.battery:.1f} Wh")
     return wrong
+
+
+def _blind(case: Any) -> float:
+    """Return how many metres off a vehicle may be that takes itself for where it should be: receivers have errors then."""
+    return BLIND if any(f.kind == "gnss" for f in case.faults) else 0.0
 
 
 def _undone(case: Any, run: Run, watched: Any, last: Mission) -> list[str]:
@@ -96,7 +101,7 @@ def _undone(case: Any, run: Run, watched: Any, last: Mission) -> list[str]:
         return _unseen(mission, run, last)
     if mission.method == "assign":
         return _unserved(case, run, watched, last)
-    return _undriven(mission, run, last)
+    return _undriven(mission, run, last, 0.5 * float(mission.spacing or 0.0) + _blind(case))
 
 
 def _unseen(mission: Mission, run: Run, last: Mission) -> list[str]:
@@ -131,8 +136,8 @@ def _unserved(case: Any, run: Run, watched: Any, last: Mission) -> list[str]:
     return wrong + ([f"served {', '.join(early)}"] if early else [])
 
 
-def _undriven(mission: Mission, run: Run, last: Mission) -> list[str]:
-    """Return pieces of planned survey tracks that nobody drove, longer than the spacing."""
+def _undriven(mission: Mission, run: Run, last: Mission, within: float) -> list[str]:
+    """Return pieces of planned survey tracks `within` so many metres of which nobody drove, longer than the spacing."""
     spacing = float(mission.spacing or 0.0)
     surveying = run.trace.kind == LEGS.index("survey")
     driven = np.column_stack([run.trace.x[surveying], run.trace.y[surveying]])
@@ -142,7 +147,7 @@ def _undriven(mission: Mission, run: Run, last: Mission) -> list[str]:
     lines = [line if line.length == 0 else shapely.segmentize(line, step) for line in map(shapely.LineString, planned)]
     places = shapely.get_coordinates(lines)
     if len(driven):
-        places = places[cKDTree(driven).query(places)[0] > 0.5 * spacing]
+        places = places[cKDTree(driven).query(places)[0] > within]
     wrecks = shapely.union_all([o.polygon for o in last.site.obstacles if o.id.startswith("wreck")])
     far = max(v.clearance for v in mission.vehicles) + spacing
     told = shapely.union_all([*last.left_out, *last.layer("undone").geometries])

@@ -52,8 +52,8 @@ def inspection(mission: Mission) -> Director:
     ) -> tuple[dict[str, Command], Memory]:
         known = memory if memory is not None else Memory(dict.fromkeys(stages, 0))
         done = known.done | {e.subject for e in events if e.kind == "served" and e.subject in before}
-        heard = {e.vehicle for e in events if e.kind == "returned"}
-        lost = (known.lost | {e.vehicle for e in events if e.kind == "lost"}) - heard
+        last = {e.vehicle: e.kind for e in events if e.kind in ("lost", "returned")}
+        lost = frozenset(v for v in known.lost | last.keys() if last.get(v) != "returned")
         away = lost | {v for v in stages if not states[v].alive}
         sent, waiting = dict(known.sent), set(known.waiting)
         abandoned, stranded = dict(known.abandoned), set(known.stranded)

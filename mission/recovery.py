@@ -85,9 +85,10 @@ def recovering(mission: Mission, *, delay: float = 0.0, tell: Tell | None = None
         time: float, states: Mapping[str, State], events: tuple[Event, ...], memory: Any
     ) -> tuple[dict[str, Command], Any]:
         now: _Memory = memory or _Memory(mission, default_director(mission), {r.vehicle: r for r in mission.routes})
-        heard = {e.vehicle for e in events if e.kind == "returned"}
+        last = {e.vehicle: e.kind for e in events if e.kind in ("lost", "returned")}  # of both in one second
+        heard = {v for v, kind in last.items() if kind == "returned"}
         missed = {v: due for v, due in (now.missed or {}).items() if v not in heard}
-        missed |= {e.vehicle: time + delay for e in events if e.kind == "lost" and e.vehicle not in now.given_up | heard}
+        missed |= {v: time + delay for v, kind in last.items() if kind == "lost" and v not in now.given_up}
         due = frozenset(v for v, when in missed.items() if when <= time)
         back = now.given_up & heard
         plan = {r.vehicle: r for r in now.mission.routes}

@@ -268,7 +268,7 @@ class Running:
                 self._stop(i)
             elif self.suffering["thruster"][i] != before["thruster"][i] and not self.lost[i]:
                 squad.scale[place, 0] = 0.5 if self.suffering["thruster"][i] else 1.0
-            if self.suffering["comms"][i] != before["comms"][i] and not self.lost[i]:
+            if self.suffering["comms"][i] != before["comms"][i] and not (self.lost[i] or self.aground[i]):
                 kind = {"kind": "mute"}
                 self.events.append(Event("lost", id, data=kind) if self.suffering["comms"][i] else Event("returned", id))
 
