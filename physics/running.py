@@ -28,7 +28,7 @@ HARBOUR = 4.0  # lengths: so near its start or end a vehicle is being launched o
 CRASH = 4.0  # m/s: a multirotor that meets the ground faster is out of the mission
 ASIDE = 50.0  # m about the ground routes in which PyBullet has the terrain
 UP = np.array([0.0, 0.0, 1.0])
-STUCK = 60.0  # s in contact without a pause: the vehicle is given up
+STUCK = 60.0  # s in contact, or down from the air, without a pause: the vehicle is given up
 
 
 @dataclass
@@ -67,7 +67,7 @@ class Running:
         self.velocity = np.zeros((self.count, 3))
         self.underway, self.moored, self.aground = (np.zeros(self.count, bool) for _ in range(3))
         self.contact = np.zeros(self.count, bool)
-        self.stuck = np.zeros(self.count)
+        self.stuck, self.down = np.zeros(self.count), np.zeros(self.count)  # s in contact; s on the ground, meant to fly
         self.commands: dict[str, tuple[Waypoint, ...]] = {}
         self.told = np.zeros(self.count, int)
         self.done = False
@@ -329,6 +329,8 @@ class Running:
         flying = self.aerial & (self.position[:, 2] > 1.0)
         self.moored = idle & ~flying & (np.hypot(*(self.position[:, :2] - self.home).T) < self.harbour)
         underway = ~self.moored & ~self.aground & (near > self.harbour)
+        self.down = np.where(self.aerial & underway & ~idle & (self.position[:, 2] <= 0.0), self.down + DECIDE, 0.0)
+        self.aground |= self.down > STUCK
         for i in np.flatnonzero(underway != self.underway):
             self.world.set_underway(int(i), bool(underway[i]))
         self.underway = underway
