@@ -13,6 +13,7 @@ from scipy.sparse.linalg import spsolve
 
 from quarterdeck.coverage.cuts import SIMPLE, hanging, move_hanging
 from quarterdeck.coverage.transfer import transfer, transfer_by_depth
+from quarterdeck.geo.deadline import time_is_up
 
 ROUNDS = 400
 PATIENCE = 25
@@ -20,6 +21,8 @@ PATIENCE = 25
 
 KICKS, KICK_CELLS = 200, 2_000_000
 """How often hard ground is shaken, and how many cells in all."""
+
+FAIRER = "the search for a fairer division"
 
 STUCK = 10
 """A border is stuck when less than this part of what it should let pass did."""
@@ -53,7 +56,7 @@ def balance(
         surplus = sizes - targets
         if np.abs(surplus).max() < 1 - 1e-9:
             return labels
-        if stale > patience:
+        if stale > patience or time_is_up(FAIRER):
             break
         want = _flow(surplus, np.sqrt(border) * ease, targets) if np.abs(surplus).max() > 2 else border[:0]
         if want.any():
@@ -98,7 +101,7 @@ def rebalance(
     best, best_cost = labels, _cost(labels, targets)
     for _ in range(min(KICKS, KICK_CELLS // len(labels))):
         sizes = np.bincount(best[best >= 0], minlength=len(targets))
-        if (sizes <= floor).all():
+        if (sizes <= floor).all() or time_is_up(FAIRER):
             break
         loads = sizes / targets
         heavy = np.flatnonzero(loads > loads.max() * 0.98)

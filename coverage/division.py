@@ -12,12 +12,13 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import KDTree
 
-from quarterdeck.coverage.balance import PATIENCE, balance, rebalance
+from quarterdeck.coverage.balance import FAIRER, PATIENCE, balance, rebalance
 from quarterdeck.coverage.bound import cells_at_least, fair_targets, pocket_bound
 from quarterdeck.coverage.bricks import straight_trees, tree_turns
 from quarterdeck.coverage.chambers import chamber_bound
 from quarterdeck.coverage.growth import grow
 from quarterdeck.coverage.recombine import recombine
+from quarterdeck.geo.deadline import time_is_up
 from quarterdeck.geo.errors import InputError
 
 STRETCH = 8
@@ -93,14 +94,16 @@ def divide(
     rng = np.random.default_rng(seed)
     tried: list[np.ndarray] = []
     for labels, (_, _, lane) in zip(grown, lanes, strict=True):
+        if tried and time_is_up(FAIRER):
+            break
         done = any(_worst(other, floor) <= 1 for other in tried)
         tried.append(balance(labels, cells, wanted, width, lane, rng, patience=BRIEF if done else PATIENCE))
     worst = np.array([_worst(labels, floor) for labels in tried])
-    if worst.min() > 1:
+    if worst.min() > 1 and not time_is_up(FAIRER):
         bound = max(bound, chamber_bound(reachable, starts, shares), key=lambda b: b.load)
         floor = cells_at_least(bound, shares)
         worst = np.array([_worst(labels, floor) for labels in tried])
-    if worst.min() > 1:
+    if worst.min() > 1 and not time_is_up(FAIRER):
         tried.append(rebalance(tried[worst.argmin()], cells, wanted, floor, width, rng))
         worst = np.append(worst, _worst(tried[-1], floor))
     good = [labels for labels, load in zip(tried, worst, strict=True) if load <= worst.min() + 1e-9]
@@ -109,8 +112,11 @@ def divide(
         return _time(np.ascontiguousarray(labels.reshape(padded.shape)[1:-1, 1:-1]), shares, turn_cost)
 
     budget = min(max(LOOKS * int(reachable.sum()), LEAST_LOOKS), MOST_LOOKS)
-    straight = min((recombine(labels, cells, width, rng, budget // 8) for labels in good), key=time)
-    straight = min((straight, recombine(straight, cells, width, rng, budget // 2)), key=time)
+    if time_is_up("the search for straighter borders of regions"):
+        straight = min(good, key=time)
+    else:
+        straight = min((recombine(labels, cells, width, rng, budget // 8) for labels in good), key=time)
+        straight = min((straight, recombine(straight, cells, width, rng, budget // 2)), key=time)
     labels = np.ascontiguousarray(straight.reshape(padded.shape)[1:-1, 1:-1])
     sizes = np.bincount(labels[labels >= 0], minlength=k)
     ratio = _worst(labels, floor)

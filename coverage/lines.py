@@ -15,6 +15,7 @@ from shapely import MultiPolygon
 from quarterdeck.coverage.laps import lay_laps
 from quarterdeck.coverage.line_order import alternate_order, order_from, short_order
 from quarterdeck.coverage.spread import Spread, strips
+from quarterdeck.geo.deadline import time_is_up
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.grid import TOLERANCE, Grid
 from quarterdeck.geo.scenario import as_multipolygon
@@ -161,12 +162,14 @@ def _best_angle(area: MultiPolygon, part: MultiPolygon, spacing: float, turn_cos
     size = np.linalg.norm(step, axis=1)
     longest = np.argsort(-size, kind="stable")[:12]
     along = np.arctan2(step[longest, 1], step[longest, 0]) % np.pi
-    angles = np.unique(np.round(np.concatenate([along, np.arange(0, np.pi, np.pi / 18)]), 9))
-    costs = []
-    for angle in angles:
-        lines = _pieces(area, part, spacing, float(angle), spread)
-        costs.append(np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum() + turn_cost * len(lines))
-    return float(angles[int(np.argmin(costs))])
+    angles = np.round(np.concatenate([along, np.arange(0, np.pi, np.pi / 18)]), 9)
+    costs: dict[float, float] = {}
+    for angle in dict.fromkeys(angles.tolist()):
+        if costs and time_is_up("the search for the best direction of lines"):
+            break
+        lines = _pieces(area, part, spacing, angle, spread)
+        costs[angle] = float(np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum()) + turn_cost * len(lines)
+    return min(costs, key=lambda angle: (costs[angle], angle))
 
 
 def _pieces(

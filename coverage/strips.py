@@ -25,6 +25,7 @@ from quarterdeck.coverage.strip_kernels import (
     fill,
     polish,
 )
+from quarterdeck.geo.deadline import time_is_up
 from quarterdeck.geo.grid import area_edges
 from quarterdeck.geo.scanline import crossings
 from quarterdeck.geo.scenario import as_multipolygon
@@ -71,6 +72,8 @@ def grow(
     bounded = bool(np.isfinite(most_per_area))
     kept, rest, budget = paths, None, np.inf
     for _ in range(ROUNDS + 1):
+        if time_is_up("the growth of tracks to the edges"):
+            break
         closed = [np.vstack([p, p[:1]]) for p in paths]
         bare = uncovered(closed, wanted, 1.0)
         left = most_per_area * (wanted.area - bare.area) - sum(track_length(t) for t in closed) if bounded else np.inf

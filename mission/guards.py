@@ -13,6 +13,7 @@ from quarterdeck.coverage.guards.certificate import TOLERANCE, mend, uncovered
 from quarterdeck.coverage.guards.fewer import fewer_guards, needless
 from quarterdeck.coverage.guards.pieces import paper_guards
 from quarterdeck.coverage.guards.space import Space, border_of, space_of
+from quarterdeck.geo.deadline import time_is_up
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Scenario, Vehicle, as_multipolygon
 from quarterdeck.geo.triangulation import Triangulation, triangulate
@@ -58,8 +59,14 @@ def plan_guards(
     mesh = triangulate(space.sight)
     guards, unseen = mend(space, mesh, paper_guards(space, reach), reach)
     seeable = space if unseen.is_empty else replace(space, target=as_multipolygon(space.target.difference(unseen)))
+    if seeable.target.is_empty:
+        raise InputError(
+            f"no part of the area can be seen from within {reach:g} m of where the vehicles may be; "
+            "draw the operating area about it, or give a longer range"
+        )
     paper = paper_tours(space, guards, team)
-    tours = paper if mode == "paper" else _optimised(scenario, seeable, mesh, paper, team, seed)
+    paper_will_do = mode == "paper" or time_is_up("the search for fewer guards and shorter tours")
+    tours = paper if paper_will_do else _optimised(scenario, seeable, mesh, paper, team, seed)
     reasons = [] if unseen.is_empty else [Reason(f"{unseen.area:.6g} m2 cannot be seen from where the vehicles may be")]
     mission = guards_mission(scenario, space, mesh, tours, team, reasons)
     compared = {"guards": len(paper.guards), "makespan": paper.makespan, "bound": paper.bound}

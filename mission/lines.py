@@ -1,7 +1,7 @@
 """Parallel lines: the division of a placed grid, each region surveyed by lines, as sonar and camera teams expect."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,9 +9,10 @@ from shapely import LineString
 
 from quarterdeck.coverage.laps import lap_space
 from quarterdeck.coverage.lines import Lines, lay_lines, split_area
-from quarterdeck.coverage.metrics import covered_fraction, measure
+from quarterdeck.coverage.metrics import covered_fraction, track_length
 from quarterdeck.coverage.placement import place
 from quarterdeck.coverage.shares import shares
+from quarterdeck.geo.deadline import time_is_up
 from quarterdeck.geo.scenario import Scenario, Vehicle
 from quarterdeck.geo.transit import Roadmap, shortest_paths
 from quarterdeck.geo.version import VERSION
@@ -78,6 +79,8 @@ def plan_lines(
     wanted = shares(vehicles)
     done = attempt(wanted)
     for _ in range(ROUNDS if sounded and len(vehicles) > 1 and vehicles[0].share is None else 0):
+        if time_is_up("the even sharing of the area"):
+            break
         # Where it is shoal there is more to drive: shares that count it make the slowest sooner done.
         wanted = wanted / np.array([max(r.duration, 1.0) for r in done.routes])
         wanted /= wanted.sum()
@@ -87,9 +90,14 @@ def plan_lines(
         done = again
     laid, routes, reasons = done.laid, done.routes, done.reasons
     site = scenario.site.coverable
-    figures = asdict(measure([t for lines in laid for t in lines.tracks], site, grid))
-    figures["poc"] = covered_fraction(survey_lines(routes), site, step)
-    del figures["turns"], figures["turns_per_1000_m2"], figures["cell_poc"]  # of lanes of a grid; there is none here
+    tracks = [t for lines in laid for t in lines.tracks]
+    length, covered = sum(track_length(t) for t in tracks), covered_fraction(tracks, site, step) * site.area
+    figures: dict[str, Any] = {
+        "poc": covered_fraction(survey_lines(routes), site, step),
+        "length": length,
+        "length_per_1000_m2": 1000.0 * length / site.area,
+        "overlap": length * step / covered - 1.0 if covered > 0 else 0.0,
+    }
     if sounded:  # one width does not say what is covered
         del figures["overlap"]
         figures |= seen(scenario, area, routes)

@@ -28,8 +28,9 @@ def mend(space: Space, mesh: Triangulation, guards: np.ndarray, reach: float) ->
     Sight is mutual: where a guard may stand to see a place is what that place sees, within reach of the robots.
     """
     views = visibility_polygons(mesh, guards, reach)
-    rest = list(uncovered(space, views).geoms)
-    hopeless: list[shapely.Polygon] = []
+    missed, within = uncovered(space, views), _within_sight(space, reach)
+    rest = list(as_multipolygon(missed.intersection(within)).geoms)
+    hopeless = list(as_multipolygon(missed.difference(within)).geoms)
     smallest = (reach / 64) ** 2
     inner = as_multipolygon(space.reach.buffer(-2 * HAIR))
     standing = inner if inner.area > 0.5 * space.reach.area else space.reach
@@ -58,6 +59,13 @@ def mend(space: Space, mesh: Triangulation, guards: np.ndarray, reach: float) ->
             hopeless.append(piece)
     lost = as_multipolygon(shapely.union_all(hopeless))
     return guards, MultiPolygon() if lost.area <= TOLERANCE * space.target.area else lost
+
+
+def _within_sight(space: Space, reach: float) -> MultiPolygon:
+    """Return what might be seen: no farther than `reach` from where robots may be, in a part of sight that has them."""
+    parts = shapely.get_parts(space.sight)
+    near = shapely.union_all(parts[shapely.intersects(parts, space.reach)])
+    return as_multipolygon(near.intersection(space.reach.buffer(1.01 * reach)))
 
 
 def _quarters(piece: shapely.Polygon) -> list[shapely.Polygon]:

@@ -51,16 +51,35 @@ def hall(tmp_path_factory):
     return path
 
 
-def test_a_plan_tells_what_its_time_limit_cut(tmp_path, capsys):
-    """The placement ends at once, the plan is whole, header and screen say what was cut."""
+CUT = {
+    "stc --spacing 80": ["the placement of the grid", "the growth of tracks to the edges"],
+    "lines --spacing 80": ["the placement of the grid", "the search for the best direction of lines"],
+    "guards --range 600": ["the search for fewer guards and shorter tours", "the bound on guards by witnesses"],
+}
+
+
+@pytest.mark.parametrize("method", CUT)
+def test_a_plan_tells_what_its_time_limit_cut(method, tmp_path, capsys):
+    """Every search ends at once, the plan is whole, header and screen say what was cut."""
     path = tmp_path / "plan.geojson"
     site = DATA / "dalian_harbour.geojson"
-    assert status("plan", site, "--spacing", "80", "--time-limit", "0.001", "-o", path) in (0, 1)
+    assert status("plan", site, "--method", *method.split(), "--time-limit", "0.001", "-o", path) in (0, 1)
     mission = read_plan(path)
     assert mission.parameters["time_limit"] == 0.001
-    assert mission.figures["cut"] == ["the placement of the grid"]
-    assert "cut short by --time-limit: the placement of the grid" in capsys.readouterr().err
-    assert mission.figures["poc"] > 0.5
+    assert set(CUT[method]) <= set(mission.figures["cut"])
+    assert f"cut short by --time-limit: {mission.figures['cut'][0]}" in capsys.readouterr().err
+    assert mission.figures.get("poc", 1.0) > 0.5
+
+
+def test_a_fleet_is_cut_where_it_is_divided(tmp_path):
+    """The division among five ends with what it has: regions that are whole, of shares that may be uneven."""
+    path = tmp_path / "plan.geojson"
+    site = DATA / "west_ant_island.geojson"
+    assert status("plan", site, "--spacing", "100", "--time-limit", "0.001", "-o", path) in (0, 1)
+    mission = read_plan(path)
+    assert "the search for a fairer division" in mission.figures["cut"]
+    assert mission.figures["poc"] > 0.9
+    assert status("check", path) in (0, 1)
 
 
 def test_a_plan_without_a_time_limit_says_nothing_of_it(hall):

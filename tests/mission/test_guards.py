@@ -49,6 +49,14 @@ def test_everything_is_seen_and_every_guard_is_passed_once(mode: str, clearance:
     assert mission.figures["makespan"] >= mission.bounds["makespan"] > 0
 
 
+def test_an_area_out_of_sight_is_refused_at_once() -> None:
+    """Apart from where vehicles may be, by land or by more than they see: one line, not a search of every corner."""
+    far = Area("far", as_multipolygon(shapely.box(200, 0, 400, 200)))
+    given = scenario((1, 1))
+    with pytest.raises(InputError, match="no part of the area can be seen"):
+        plan_guards(replace(given, site=replace(given.site, areas=(far,))), range=12.0)
+
+
 def test_optimised_is_never_worse_and_the_same_seed_gives_the_same_plan() -> None:
     """Fewer or as many guards, a makespan as short or shorter, and the same bytes."""
     given = scenario((1, 1), (2, 1), (3, 1))
