@@ -55,10 +55,10 @@ def guide_vessels(
         if t.mode == SAIL:
             tx, ty, length, along, cross = _leg(t, table, x, y)
             remaining = length - along
-            wanted = min(table[t.leg].speed, t.slow)
+            wanted = min(table[t.leg].speed, max(t.slow, 0.0))
             if _stops(t, table, time):
                 wanted = min(wanted, max(np.sqrt(2 * 0.5 * lim.accel * max(remaining - ARRIVED / 2, 0.0)), 0.2))
-            _step_aside(t, lim, step)
+            _step_aside(t, lim.speed, step)
             ahead = max(2.5 * lim.length, 1.5 * lim.speed)
             t.cross, t.turning = cross, along < lim.zone or remaining < lim.zone or t.aside != 0
             cross += t.aside
@@ -77,6 +77,9 @@ def guide_vessels(
             if away < ARRIVED and np.hypot(wx, wy) < 0.2:  # near enough in slack water: rest
                 heading[i], speed[i] = psi, 0.0
                 continue
+        if t.mode == SAIL and t.slow < 0.0:  # astern
+            heading[i], speed[i] = psi, t.slow
+            continue
         if np.hypot(wx, wy) < 0.1:
             heading[i], speed[i] = course if t.mode == SAIL else psi, 0.0
             continue
@@ -128,9 +131,12 @@ def guide_rovers(
             t.cross, t.turning = 0.0, True
             continue
         tx, ty, length, along, cross = _leg(t, table, x, y)
-        _step_aside(t, lim, step)
+        _step_aside(t, lim.speed, step)
         t.cross, t.turning = cross, along < lim.zone or length - along < lim.zone or t.aside != 0
         cross += t.aside
+        if t.slow < 0.0:  # astern
+            speed[i] = t.slow
+            continue
         if t.mode == ROTATE:
             error = _wrap(np.arctan2(ty, tx) - psi)
             if abs(error) < 0.02 or length < near:
@@ -143,7 +149,7 @@ def guide_rovers(
             wanted = min(wanted, max(np.sqrt(2 * 0.7 * lim.accel * max(length - along - near, 0.0)), 0.05))
         ahead = max(0.5 * lim.length, 0.8 * abs(velocity[i]))
         bearing = _wrap(np.arctan2(ty * ahead - tx * cross, tx * ahead + ty * cross) - psi + t.bias)
-        if abs(bearing) > 1.0:  # pushed off its path: face it first
+        if abs(bearing) > (1.0 if t.slow > 0.0 else 0.1):  # pushed off its path, or held: face it first
             turn[i] = min(max(2.0 * bearing, -lim.rate), lim.rate)
             continue
         speed[i] = wanted
@@ -175,14 +181,18 @@ def guide_multirotors(
             # How far the vehicle trails its reference holds the reference back.
             gap = np.sqrt((reference[i, 0] - position[i, 0]) ** 2 + (reference[i, 1] - position[i, 1]) ** 2
                           + (reference[i, 2] - position[i, 2]) ** 2)  # fmt: skip
-            wanted = min(b.speed, t.slow) * min(max(2.0 - gap / 2.0, 0.0), 1.0)
+            wanted = min(b.speed, max(t.slow, 0.0)) * min(max(2.0 - gap / 2.0, 0.0), 1.0)
+            if t.slow < 0.5 * b.speed and t.aside != t.want:  # first out of the other's way
+                wanted = 0.0
             rate = lim.climb if dz > 0 else lim.sink
             if length > 0 and abs(dz) / length * wanted > rate:
                 wanted = rate * length / abs(dz)
             leave = 0.0 if _stops(t, table, time) else _corner_speed(t, table, lim.accel)
             wanted = min(wanted, np.sqrt(leave**2 + 2 * 0.7 * lim.accel * max(length - t.reach, 0.0)))
             t.pace = min(max(wanted, t.pace - lim.accel * step), t.pace + 0.7 * lim.accel * step)
-            t.reach += max(t.pace, 0.05) * step
+            t.reach += max(t.pace, min(0.05, wanted)) * step
+            if t.slow < 0.0:  # astern
+                t.pace, t.reach = 0.0, max(t.reach + t.slow * step, 0.0)
             if t.reach >= length:
                 if _stops(t, table, time):
                     t.reach, t.pace = length, 0.0
@@ -200,9 +210,9 @@ def guide_multirotors(
             reference[i, 3], reference[i, 4], reference[i, 5] = v * dx, v * dy, v * dz
             if np.hypot(dx, dy) > 0.1:
                 reference[i, 6] = np.arctan2(dy, dx)
-                _step_aside(t, lim, step)
-                reference[i, 0] += t.aside * dy / np.hypot(dx, dy)
-                reference[i, 1] -= t.aside * dx / np.hypot(dx, dy)
+            _step_aside(t, min(lim.speed, max(t.slow, 0.0)), step)  # here the shift is the motion
+            reference[i, 0] += t.aside * np.sin(reference[i, 6])
+            reference[i, 1] -= t.aside * np.cos(reference[i, 6])
             px, py, pz = position[i, 0] - a.x, position[i, 1] - a.y, position[i, 2] - a.z
             along = (px * dx + py * dy + pz * dz) / length
             t.cross = np.sqrt(max(px * px + py * py + pz * pz - along * along, 0.0))
@@ -214,9 +224,9 @@ def guide_multirotors(
 
 
 @njit(cache=True)
-def _step_aside(t: Any, lim: Any, step: float) -> None:
-    """Move towards the offset that separation wants, a third as fast as the vehicle goes."""
-    most = 0.33 * lim.speed * step
+def _step_aside(t: Any, speed: float, step: float) -> None:
+    """Move towards the offset that separation wants, at a third of `speed`."""
+    most = 0.33 * speed * step
     t.aside += min(max(t.want - t.aside, -most), most)
 
 

@@ -64,7 +64,7 @@ class Running:
         self.battery = np.array([v.battery for v in vehicles])
         self.random = np.random.default_rng(self.seed)
         self.gust = np.zeros((self.count, MEMORY))
-        self.velocity = np.zeros((self.count, 3))
+        self.velocity, self.rate = np.zeros((self.count, 3)), np.zeros(self.count)
         self.underway, self.moored, self.aground = (np.zeros(self.count, bool) for _ in range(3))
         self.contact = np.zeros(self.count, bool)
         self.stuck, self.down = np.zeros(self.count), np.zeros(self.count)  # s in contact; s on the ground, meant to fly
@@ -132,7 +132,7 @@ class Running:
                 position[i], heading[i], velocity[i] = body, psi, (body - self.position[i]) / step
         falling = (self.velocity[:, 2] < -CRASH) | self.lost
         self.aground |= self.aerial & falling & (position[:, 2] <= 0.0)
-        self.position, self.heading, self.velocity = position, heading, velocity
+        self.position, self.heading, self.velocity, self.rate = position, heading, velocity, rate
         self.stuck = np.where(self.contact, self.stuck + step, 0.0)
         if self.senses is not None:
             self._sense(self.senses)
@@ -340,7 +340,7 @@ class Running:
 
     def _keep_clear(self) -> None:
         present = ~self.moored & ~self.aground
-        self.watch.keep_clear(self.time, self.fleet, self.position, self.heading, self.velocity, present)
+        self.watch.keep_clear(self.time, self.fleet, self.position, self.heading, self.velocity, self.rate, present)
 
     def _serve(self, reached: np.ndarray) -> tuple[Event, ...]:
         """Return an event for each task served since the last call."""

@@ -1,4 +1,4 @@
-"""The watch that vehicles keep on one another, so that they stay clear: `separation`'s rules, and the room to obey them."""
+"""The watch that vehicles keep on one another: the rules of `separation`, the room to obey them, and `braking` in time."""
 
 from collections.abc import Sequence
 
@@ -7,12 +7,19 @@ import shapely
 from shapely import LineString
 
 from quarterdeck.geo.scenario import Site, Vehicle
+from quarterdeck.physics.braking import BRAKES, TOUCH, brake_in_time
 from quarterdeck.physics.fleet import Fleet
-from quarterdeck.physics.separation import creep_on, give_way, stop_short
+from quarterdeck.physics.paths import HOLD
+from quarterdeck.physics.separation import give_way
+from quarterdeck.physics.world import HEIGHT
 
 KEEP = 3.0  # lengths kept from other vehicles
+SLIM = 1.4  # half diagonals that count as a length where a hull is higher than long
 WARY = 0.2  # s between looks out for others where some are near
-WAITS = 8.0  # s that a vehicle stands for others before it creeps on
+WAITS = 8.0  # s that a vehicle stands for others before it goes around
+TURN = 40.0  # s that one of those who stand has to go around before it is another's turn
+AHEAD = 5.0  # s that one that is aside, or is to go there, looks ahead for room
+LAG = {"surface": 2.0, "ground": 0.3, "aerial": 0.5}  # s in which speed fades: of a vessel by its autopilot's gain
 
 
 class Watch:
@@ -24,12 +31,18 @@ class Watch:
         count = len(vehicles)
         self.length = np.array([v.model.length for v in vehicles])
         self.hull = np.array([[v.model.length, v.model.width] for v in vehicles])
-        self.keep = KEEP * self.length
-        self.brakes = np.array([v.model.acceleration for v in vehicles])
-        rooms = {d: site.navigable(d) for d in sorted({v.domain for v in vehicles})}
+        self.aerial = np.array([v.domain == "aerial" for v in vehicles])
+        height = np.array([HEIGHT[v.domain] for v in vehicles]) * self.aerial  # others pass above and below
+        reach = np.linalg.norm([*self.hull.T, height], axis=0) / 2
+        self.keep = KEEP * np.maximum(self.length, SLIM * reach)
+        rows = [(v.model.acceleration, LAG[v.domain], _surge(v)) for v in vehicles]
+        self.brakes = np.array([(r, *row) for r, row in zip(reach.tolist(), rows, strict=True)], BRAKES)
+        margins = [(v.domain, TOUCH * v.model.width / 2) for v in vehicles]
+        rooms = {key: site.navigable(*key) for key in sorted(set(margins))}
         shapely.prepare(list(rooms.values()))
-        self.room = [rooms[v.domain] for v in vehicles]
-        self.slow, self.stood, self.wary = np.full(count, np.inf), np.zeros(count), False
+        self.room = [rooms[key] for key in margins]
+        self.slow, self.wary = np.full(count, np.inf), False
+        self.anchor, self.since = np.full((count, 3), np.inf), np.zeros(count)
 
     def keep_clear(
         self,
@@ -38,40 +51,71 @@ class Watch:
         position: np.ndarray,
         heading: np.ndarray,
         velocity: np.ndarray,
+        rate: np.ndarray,
         present: np.ndarray,
     ) -> None:
         """Have vehicles give way to one another; one that has no room to go aside stays on its path.
 
         Before what lies still on its path it stops, if it can pass on neither side. `position` (k, 3) metres, `heading`
-        (k,) radians, `velocity` (k, 3) m/s over ground; `present` (k,) are those out there.
+        (k,) radians, `velocity` (k, 3) m/s over ground, `rate` (k,) rad/s; `present` (k,) are those out there.
         """
         count = len(position)
         slow, want, instead = (np.empty(count) for _ in range(3))
-        course, aside, rest = fleet.gather("course"), fleet.gather("aside"), fleet.gather("rest")
-        speed = np.hypot(velocity[:, 0], velocity[:, 1])
+        course, aside, rest = fleet.gather("course"), fleet.gather("shifted"), fleet.gather("rest")
+        speed = np.linalg.norm(velocity, axis=1)
         pace = np.where(fleet.gather("idle"), 0.0, fleet.gather("pace"))
-        give_way(position, course, speed, pace, fleet.gather("shifted"), self.keep, present, slow, want, instead)
-        for i in map(int, np.flatnonzero((want != 0) & (want != aside))):
-            reach = course[i] * min(speed[i] * 5.0, rest[i])
-            if self._has_room(i, position[i], reach, course[i], want[i] - aside[i]):
-                continue
-            if np.isnan(instead[i]):
-                want[i] = aside[i]
-            elif self._has_room(i, position[i], reach, course[i], instead[i] - aside[i]):
-                want[i] = instead[i]
-            else:
-                want[i], slow[i] = aside[i], 0.0
-        self.wary = stop_short(position, velocity, course, pace, want - aside, self.length, self.brakes, present, slow)
-        free = (slow > 0.05 * pace) | ~np.any(course != 0.0, axis=1) | ~present
-        self.stood = np.where(free, time, self.stood)
-        stands = time - self.stood > WAITS + 2.0 * np.arange(count)
-        creep_on(position, heading, velocity, pace, self.hull, self.brakes, present, stands, slow)
+        going = present & (fleet.gather("tracks")["mode"] != HOLD) & (pace > 0.0)
+        order, stood = self._stand(time, position, going)
+        place = np.empty(count, int)
+        place[order] = np.arange(count)
+        stands = stood > WAITS
+        start, end = fleet.gather("ends").transpose(1, 0, 2)
+        leg = (end - start) * going[:, None] / np.maximum(np.linalg.norm(end - start, axis=1), 1e-9)[:, None]
+        bow = np.column_stack([np.cos(heading), np.sin(heading)])
+        side = np.where(np.any(course != 0.0, axis=1, keepdims=True), course, bow)[:, ::-1] * [1.0, -1.0]
+        give_way(position, course, leg, side, speed, pace, aside, self.keep, present, place, stands, slow, want, instead)
+        for i in map(int, np.flatnonzero(((want != 0) | (aside != 0)) & going)):
+            reach = course[i] * min(max(speed[i], 0.5 * pace[i]) * AHEAD, rest[i])
+            sides = [w for w in (want[i], instead[i], aside[i], 0.0) if not np.isnan(w)]
+            free = next((w for w in sides if self._has_room(i, position[i, :2], reach, (w - aside[i]) * side[i])), None)
+            want[i] = 0.0 if free is None else free
+            if not np.isnan(instead[i]) and want[i] not in sides[:2]:  # it can pass on neither side
+                slow[i] = 0.0
+            if free is None:  # back to its path, as steeply as it can
+                slow[i] = min(slow[i], 0.25 * pace[i])
+        # Vessels and rovers set out along the bow, aerial vehicles to where they want to be.
+        level = np.column_stack([side * (want - aside)[:, None], np.zeros(count)])
+        onward = 2 * self.length[:, None] * leg * ~(stands & (want != aside))[:, None]
+        facing = np.where(self.aerial[:, None], onward + level, np.column_stack([bow, np.zeros(count)]))
+        facing *= (going / np.maximum(np.linalg.norm(facing, axis=1), 1e-9))[:, None]
+        passing = (want != 0) | (aside != 0) | ~np.isnan(instead)
+        backs = stands & passing
+        for i in map(int, np.flatnonzero(backs)):
+            backs[i] = self._has_room(i, position[i, :2], -0.5 * self.keep[i] * facing[i, :2], np.zeros(2))
+        self.wary = brake_in_time(position, velocity, rate, facing, pace, self.brakes, present, order, passing, backs, slow)
         self.slow = slow
         for squad in fleet.squads:
             squad.tracks["slow"], squad.tracks["want"] = slow[squad.index], want[squad.index]
 
-    def _has_room(self, i: int, here: np.ndarray, ahead: np.ndarray, course: np.ndarray, starboard: float) -> bool:
-        """Return whether vehicle `i`, now `here`, can go `ahead`, (2,) metres, and as many further to starboard."""
-        there = here[:2] + ahead
-        side = there + starboard * np.array([course[1], -course[0]])
-        return self.room[i].contains(LineString([here[:2], there, side]))
+    def _stand(self, time: float, position: np.ndarray, going: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the order in which vehicles go, (k,), who stood for longest first, and for how long each has, (k,) s.
+
+        One stands that is `going` (k,) somewhere and has not come the distance kept further. Those who stand take
+        turns: the first may have no room.
+        """
+        moved = ~going | (np.linalg.norm(position - self.anchor, axis=1) > self.keep)
+        self.anchor[moved], self.since[moved] = position[moved], time
+        stood = time - self.since
+        order = np.argsort(np.where(stood > WAITS, self.since, np.inf), kind="stable")
+        standing = int((stood > WAITS).sum())
+        order[:standing] = np.roll(order[:standing], int(time // TURN))
+        return order, stood
+
+    def _has_room(self, i: int, here: np.ndarray, ahead: np.ndarray, aside: np.ndarray) -> bool:
+        """Return whether vehicle `i`, now `here`, can go `ahead`, and as many metres further `aside`, all (2,)."""
+        return bool(self.room[i].contains(LineString([here, here + ahead, here + ahead + aside])))
+
+
+def _surge(vehicle: Vehicle) -> float:
+    """Return how fast a vehicle gains speed when it sets out, m/s2: its controllers', more than planners count on."""
+    return {"surface": 0.6 * vehicle.speed, "ground": 5.0, "aerial": vehicle.model.acceleration}[vehicle.domain]

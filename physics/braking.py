@@ -1,0 +1,151 @@
+"""Braking in time: each goes on only where its way to rest stays clear of the others' ways to rest.
+
+A vehicle's way is where it passes if it brakes now; that of one that goes on is where it passes if it does so for one
+look more and brakes then. As long as no two ways meet, all can come to rest without touching, whatever the others do. So at
+each look one after the other goes on if its way then keeps off everybody's, or gets away from the one that it is too near
+to; else it brakes. This is passive safety as Macek et al. 2009 and Bouraine et al. 2012 have it, with ways in place of
+trajectories: when somebody passes does not matter, so nobody need know how fast the others go.
+"""
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+LOOK = 0.4  # s that a vehicle goes on before it brakes: a look, and what it takes to act on it
+TOUCH = 1.1  # of both hulls' half diagonals: how near ways may come
+SPARE = 1.5  # times as far off one stays that is not about to pass: from there one can turn and go around
+BACK = 0.15  # of its pace that one goes astern
+OPENING = 0.3  # of its way: so much one gets away by it that was too near
+PIECES = 3  # straight ones that a way is made of
+
+BRAKES = np.dtype([(n, float) for n in ("reach", "brake", "lag", "surge")])
+
+
+@njit(cache=True)
+def brake_in_time(
+    position: np.ndarray,
+    velocity: np.ndarray,
+    rate: np.ndarray,
+    facing: np.ndarray,
+    pace: np.ndarray,
+    brakes: np.ndarray,
+    present: np.ndarray,
+    order: np.ndarray,
+    passing: np.ndarray,
+    backs: np.ndarray,
+    slow: np.ndarray,
+) -> bool:
+    """Set `slow` (k,), the speed allowed, m/s, to 0 for each that has to brake; return whether some are near to others.
+
+    One that has to brake and `backs` (k,) off goes astern, `slow` below 0, if it gets away from whom it is too near to.
+
+    `position` (k, 3); `velocity` (k, 3) m/s over ground; `rate` (k,) rad/s of turn; `facing` (k, 3) the direction in which
+    each sets out if it stands, zeros for one that goes nowhere; `pace` (k,) m/s as planned; `brakes` (k,) BRAKES: half the
+    hull's diagonal, m, m/s2 of braking, seconds in which speed fades at the least, and m/s2 of setting out. They choose in
+    `order` (k,); those that are `passing` (k,) others come as near as TOUCH.
+    """
+    count = len(position)
+    ways = np.empty((count, PIECES + 1, 3))
+    far = np.zeros(count)
+    for i in range(count):
+        if present[i]:
+            far[i] = _way(ways[i], position[i], velocity[i], rate[i], facing[i], 0.0, brakes[i])
+    on = np.empty((PIECES + 1, 3))
+    near = False
+    for i in order:
+        if not present[i]:
+            continue
+        wanted = min(pace[i], slow[i])
+        further = _way(on, position[i], velocity[i], rate[i], facing[i], wanted, brakes[i])
+        clear, close = True, False
+        for j in range(count):
+            if j == i or not present[j]:
+                continue
+            dx, dy, dz = position[j] - position[i]
+            away = np.sqrt(dx * dx + dy * dy + dz * dz)
+            touch = TOUCH * (brakes[i].reach + brakes[j].reach)
+            keep = touch if passing[i] or not np.any(facing[j] != 0.0) else SPARE * touch
+            near |= away < keep + further + far[j] + pace[i] + pace[j]
+            if away < keep + further + far[j]:
+                after = _between(on, ways[j])
+                clear &= after >= keep or _opens(on, further, after, ways[j])
+                close |= away < SPARE * touch
+        if clear and wanted > 0.0:
+            ways[i], far[i] = on, further
+        elif not clear:
+            slow[i] = 0.0
+            if backs[i] and close:
+                astern = BACK * pace[i]
+                further = _way(on, position[i], velocity[i], rate[i], -facing[i], astern, brakes[i])
+                clear = True
+                for j in range(count):
+                    if j != i and present[j] and clear:
+                        touch = TOUCH * (brakes[i].reach + brakes[j].reach)
+                        after = _between(on, ways[j])
+                        clear = after >= SPARE * touch or _opens(on, further, after, ways[j])
+                if clear:
+                    slow[i], ways[i], far[i] = -astern, on, further
+    return near
+
+
+@njit(cache=True)
+def _way(
+    way: np.ndarray, position: np.ndarray, velocity: np.ndarray, rate: float, facing: np.ndarray, wanted: float, b: Any
+) -> float:
+    """Set `way` (PIECES + 1, 3), the places passed until at rest, and return its length.
+
+    If `wanted` m/s is 0 it brakes now, else after it has gone on and gained on it for LOOK.
+    """
+    ux, uy, uz = velocity
+    if wanted > 0.0:
+        gain = min(max(wanted - (ux * facing[0] + uy * facing[1] + uz * facing[2]), 0.0), b.surge * LOOK)
+        ux, uy, uz = ux + gain * facing[0], uy + gain * facing[1], uz + gain * facing[2]
+    speed = np.sqrt(ux * ux + uy * uy + uz * uz)
+    time = max(b.lag, speed / (2 * b.brake)) + (LOOK if wanted > 0.0 else 0.0)
+    turn = rate * b.lag if speed > 0.05 else 0.0  # radians, all along
+    for n in range(PIECES + 1):
+        part = n / PIECES
+        cos, sin = np.cos(0.5 * turn * part), np.sin(0.5 * turn * part)
+        way[n, 0] = position[0] + part * time * (cos * ux - sin * uy)
+        way[n, 1] = position[1] + part * time * (sin * ux + cos * uy)
+        way[n, 2] = position[2] + part * time * uz
+    return time * speed
+
+
+@njit(cache=True)
+def _opens(way: np.ndarray, length: float, nearest: float, other: np.ndarray) -> bool:
+    """Return whether one that is too near to another's way gets away from it, and never nearer."""
+    now, then = np.inf, np.inf
+    for b in range(len(other) - 1):
+        now = min(now, _apart(way[0], way[0], other[b], other[b + 1]))
+        then = min(then, _apart(way[-1], way[-1], other[b], other[b + 1]))
+    return nearest >= now - 1e-6 and then >= now + OPENING * length
+
+
+@njit(cache=True)
+def _between(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the least distance between two ways (n, 3), metres."""
+    least = np.inf
+    for a in range(len(one) - 1):
+        for b in range(len(other) - 1):
+            least = min(least, _apart(one[a], one[a + 1], other[b], other[b + 1]))
+    return least
+
+
+@njit(cache=True)
+def _apart(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> float:
+    """Return the distance between the pieces from `a` to `b` and from `c` to `d` (Ericson 2005, section 5.1.9)."""
+    ux, uy, uz = b - a
+    vx, vy, vz = d - c
+    wx, wy, wz = a - c
+    uu, vv, uv = ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, ux * vx + uy * vy + uz * vz
+    uw, vw = ux * wx + uy * wy + uz * wz, vx * wx + vy * wy + vz * wz
+    s, square = 0.0, uu * vv - uv * uv
+    if square > 1e-12:
+        s = min(max((uv * vw - uw * vv) / square, 0.0), 1.0)
+    t = (uv * s + vw) / vv if vv > 1e-12 else 0.0
+    t = min(max(t, 0.0), 1.0)
+    s = min(max((uv * t - uw) / uu, 0.0), 1.0) if uu > 1e-12 else 0.0
+    x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
+    return np.sqrt(x * x + y * y + z * z)
