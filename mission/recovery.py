@@ -1,5 +1,5 @@
-"""The director that recovers: it follows the plan until a vehicle is lost or comes back, or finds no way to where it
-should be, and then replans for all.
+"""The director that recovers: it follows the plan until a vehicle is lost or comes back, falls behind, or finds no way to
+where it should be, and then replans for all.
 
 It knows what was last heard: of a vehicle that is silent it knows neither where it is nor whether it works, nor can it
 tell it of a new plan. Silent for longer than the delay, it is given up, and stays in the others' way where it was last.
@@ -16,12 +16,13 @@ import shapely
 from shapely import MultiPolygon, Point
 
 from quarterdeck.geo.errors import InputError
-from quarterdeck.geo.scenario import Obstacle, as_multipolygon
+from quarterdeck.geo.scenario import Obstacle, Vehicle, as_multipolygon
 from quarterdeck.mission.changes import Changes
 from quarterdeck.mission.contact import Contact, within_range
 from quarterdeck.mission.director import Command, Director, Event, State
 from quarterdeck.mission.inspection import Memory as Inspected
 from quarterdeck.mission.inspection import default_director
+from quarterdeck.mission.lateness import Course, course, looked, measured_pace
 from quarterdeck.mission.mission import Mission, Route, Waypoint
 from quarterdeck.mission.progress import Progress, surveyed
 from quarterdeck.mission.reason import Reason
@@ -44,8 +45,8 @@ class _Memory:
     they found no way, `undone` what earlier plans told could not be done. `untried` have not been heard of since they were
     told of the plan: how far they say to have come is how far they had come by the one before it. `sent` are the waypoints
     that each was commanded last, `serving` the task that it is at by them, and since when. `wrecks` are the ids that those
-    who were given up have as obstacles, by vehicle, `found` the ids of what robots have found. `tellings` are
-    all new routes told so far.
+    who were given up have as obstacles, by vehicle, `found` the ids of what robots have found. `tellings` are all new routes
+    told so far. `courses` say how each gets on with what it was commanded last.
     """
 
     mission: Mission
@@ -67,19 +68,22 @@ class _Memory:
     wrecks: Mapping[str, str] = field(default_factory=dict)
     found: frozenset[str] = frozenset()
     tellings: tuple[Telling, ...] = ()
+    courses: Mapping[str, Course] = field(default_factory=dict)
 
 
 def recovering(mission: Mission, *, delay: float = 0.0, tell: Tell | None = None) -> Director:
     """Return the director that replans (`mission.replan.replan`) `delay` seconds after a loss is heard of.
 
-    Who is heard of again within the delay was a false alarm; who comes back later takes a part of what is left. Where a
-    robot finds no way to a task, what it found becomes an obstacle of the new plan, and the task goes to who can reach it.
-    `tell` gets the time and each new plan. A loss that nobody is left to recover from changes nothing until somebody comes
-    back. A triage team sees to its losses itself. Vehicles with a `range` are heard within it alone (`mission.contact`),
-    except in guards plans, where it is how far they see.
+    Who is heard of again within the delay was a false alarm; who comes back later takes a part of what is left. Who falls
+    behind its plan for long (`mission.lateness`) is planned with the speed that it makes, and goes on as fast as it can:
+    should it be faster again, it is planned so. Where a robot finds no way to a task, what it found becomes an obstacle of
+    the new plan, and the task goes to who can reach it. `tell` gets the time and each new plan. A loss that nobody is left
+    to recover from changes nothing until somebody comes back. A triage team sees to its losses itself. Vehicles with a
+    `range` are heard within it alone (`mission.contact`), except in guards plans, where it is how far they see.
     """
     if mission.method == METHOD:
         return default_director(mission)
+    first = {v.id: v for v in mission.vehicles}
 
     def direct(
         time: float, states: Mapping[str, State], events: tuple[Event, ...], memory: Any
@@ -107,18 +111,24 @@ def recovering(mission: Mission, *, delay: float = 0.0, tell: Tell | None = None
             barred=now.barred | {(e.vehicle, e.subject) for e in barred},
             untried=now.untried - {v for v, s in states.items() if s.alive and time > now.since},
             serving={**now.serving, **_at_work(now, time, states)},
+            courses={v: looked(c, first[v], states[v], time) for v, c in now.courses.items()},
         )
+        speeds = _speeds(now, first)
         stale = {v for v in heard & plan.keys() if now.following.get(v) is not plan[v]}  # replanned while it was silent
-        if due & plan.keys() or back or stale or barred:
-            after = _replanned(now, mission, time, states, _found([e.data["found"] for e in barred]), tell)
+        if due & plan.keys() or back or stale or barred or speeds:
+            after = _replanned(now, mission, time, states, _found([e.data["found"] for e in barred]), speeds, tell)
             if after.mission is not now.mission:
                 events = tuple(e for e in events if e not in barred)
             now = after
-        now = replace(now, wake=min((now.missed or {}).values(), default=inf))
         events = tuple(e for e in events if e.kind not in ("lost", "returned"))  # whoever waits for the silent waits on
         commands, inner = now.director(time - now.since, states, events, now.inner)
-        sent = {**now.sent, **{v: c.waypoints for v, c in commands.items() if states[v].alive}}
-        return commands, replace(now, inner=inner, sent=sent)
+        sent = {v: c.waypoints for v, c in commands.items() if states[v].alive}
+        slow = {v.id: v for v in now.mission.vehicles}
+        courses = {**now.courses, **{v: course(slow[v], states[v], way, time) for v, way in sent.items()}}
+        looks = (c.look for v, c in courses.items() if states[v].alive and not (states[v].idle and v not in sent))
+        wake = min([*(now.missed or {}).values(), *looks], default=inf)
+        now = replace(now, inner=inner, sent={**now.sent, **sent}, courses=courses, wake=wake)
+        return {v: _at_best(c, first[v], slow.get(v, first[v])) for v, c in commands.items()}, now
 
     ranged = mission.method != "guards" and any(v.range is not None for v in mission.vehicles)
     return within_range(direct, mission) if ranged else direct
@@ -135,12 +145,31 @@ def _at_work(now: _Memory, time: float, states: Mapping[str, State]) -> dict[str
     return found
 
 
+def _speeds(now: _Memory, first: Mapping[str, Vehicle]) -> dict[str, float]:
+    """Return the speeds in m/s of vehicles that are slower or faster than the plan has them."""
+    found = {}
+    for vehicle in now.mission.vehicles:
+        if vehicle.id in now.courses and vehicle.id not in now.given_up:
+            speed = min(vehicle.speed * measured_pace(now.courses[vehicle.id], vehicle), first[vehicle.id].speed)
+            if speed != vehicle.speed:
+                found[vehicle.id] = speed
+    return found
+
+
+def _at_best(command: Command, first: Vehicle, planned: Vehicle) -> Command:
+    """Return the command of a vehicle that is planned to be slow: to go as fast as it can."""
+    if planned.speed == first.speed:
+        return command
+    return Command(tuple(replace(w, speed=w.speed * first.speed / planned.speed) for w in command.waypoints))
+
+
 def _replanned(
     now: _Memory,
     first: Mission,
     time: float,
     states: Mapping[str, State],
     found: tuple[Obstacle, ...],
+    speeds: Mapping[str, float],
     tell: Tell | None,
 ) -> _Memory:
     """Return the memory with a new plan for all who are not given up, or, where nobody is left, the old one."""
@@ -169,6 +198,7 @@ def _replanned(
     changes = Changes(
         lost=frozenset(planned & now.given_up),
         back=dict.fromkeys(sorted(working - planned)),
+        speeds={v: speed for v, speed in speeds.items() if v in working & planned},
         obstacles=(*new.values(), *found),
         gone=frozenset(now.wrecks[v] for v in afloat) | (now.found if found else frozenset()),
     )
@@ -196,6 +226,7 @@ def _replanned(
         untried=frozenset(told),
         sent={v: way for v, way in now.sent.items() if v not in told},
         serving={v: work for v, work in now.serving.items() if v not in told},
+        courses={v: c for v, c in now.courses.items() if v not in told},
         wrecks={v: i for v, i in now.wrecks.items() if v not in afloat} | dict(zip(new, ids, strict=False)),
         found=frozenset(ids[len(new) :]) if found else now.found,
         tellings=(*now.tellings, *(_telling(now, time, states[v], route, after) for v, route in told.items())),
