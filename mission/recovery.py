@@ -45,8 +45,8 @@ class _Memory:
     they found no way, `undone` what earlier plans told could not be done. `untried` have not been heard of since they were
     told of the plan: how far they say to have come is how far they had come by the one before it. `sent` are the waypoints
     that each was commanded last, `serving` the task that it is at by them, and since when. `wrecks` are the ids that those
-    who were given up have as obstacles, by vehicle, `found` the ids of what robots have found. `tellings` are all new routes
-    told so far. `courses` say how each gets on with what it was commanded last.
+    who were given up have as obstacles, by vehicle, `found` the ids of what robots have found. `tellings` are all routes
+    told anew so far. `courses` say how each gets on with what it was commanded last.
     """
 
     mission: Mission

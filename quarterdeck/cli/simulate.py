@@ -87,7 +87,7 @@ class Limit(click.ParamType):
     multiple=True,
     help="What goes wrong: usv-2@600 (lost), gnss:usv-1@300-420, thruster:usv-3@100, comms:usv-1@50, random:3; repeatable.",
 )
-@click.option("--recover", is_flag=True, help="Replan in the run when a vehicle is lost or comes back.")
+@click.option("--recover", is_flag=True, help="Replan in the run when a vehicle is lost, slow or back.")
 @click.option("--delay", type=Real(min=0), default=30.0, show_default=True,
               help="Seconds without a word before a vehicle is given up (with --recover).")  # fmt: skip
 @click.option("--gnss", type=Choice(["rtk", "sbas", "single"]), help="Receivers with errors, instead of perfect ones.")
