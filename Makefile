@@ -5,7 +5,7 @@ BIN = $(VENV)/bin
 OUT ?= out
 LOWEST ?= tests/geo tests/coverage tests/exporters tests/mission/test_planfile.py tests/mission/test_cover.py tests/physics/test_simulate.py \
 	tests/campaign/test_summary.py tests/house/test_first_contact.py tests/house/test_assign_cli.py --ignore tests/exporters/test_mavsdk.py
-ALL_CORES = -n logical --dist worksteal
+ALL_CORES = -n logical --maxprocesses 8 --dist worksteal
 
 .PHONY: demo test lint bench bench-coverage bench-physics bench-assign bench-triage soak docs docs-pictures docs-site lowest clean
 

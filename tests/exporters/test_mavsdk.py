@@ -62,7 +62,7 @@ def test_mavsdk_imports_the_same_items(system, request, tmp_path, monkeypatch):
         path = tmp_path / f"{stem}.plan"
         path.write_text(plans[f"{stem}.plan"])
         wanted[path] = [row.split("\t") for row in lists[f"{stem}.waypoints"].splitlines()[2:]]
-    imported = asyncio.run(asyncio.wait_for(import_plans(port, list(wanted)), 20))
+    imported = asyncio.run(asyncio.wait_for(import_plans(port, list(wanted)), 120))
     for path, rows in wanted.items():
         data = imported[path]
         items = data.mission_items[PRELUDE[autopilot] :]

@@ -24,7 +24,10 @@ def test_wheel_holds_every_room(tmp_path):
     """A wheel has each module of each room as a regular file, the samples, the schemas, the type marker, nothing else."""
     pytest.importorskip("build", reason="the package `build` is not installed")
     shutil.copytree(
-        ROOT, tmp_path / "clone", symlinks=True, ignore=shutil.ignore_patterns(".*", "build", "out", "*.egg-info")
+        ROOT,
+        tmp_path / "clone",
+        symlinks=True,
+        ignore=shutil.ignore_patterns(".*", "__pycache__", "build", "out", "*.egg-info"),
     )
     command = [sys.executable, "-m", "build", "--wheel", "--outdir", str(tmp_path), str(tmp_path / "clone")]
     subprocess.run(command, check=True, capture_output=True)
