@@ -169,3 +169,17 @@ def test_a_slow_vehicle_is_found_and_relieved():
     assert after.vehicle("ugv-1").speed == mission.vehicle("ugv-1").speed
     assert run.report.figures["time"] < plain["time"] - 60.0
     assert run.report.figures["coverage_driven"] > plain["coverage_planned"] - 0.01
+
+
+def test_who_is_heard_and_lost_in_one_second_is_lost():
+    """A vehicle that was silent, is heard again and stops, all between two looks, is given no route."""
+    mission = plan("plant_yard")
+    told = []
+    director = recovering(mission, tell=lambda *plan: told.append(plan[1]))
+    one, other = (r.vehicle for r in mission.routes)
+    states = {r.vehicle: State(*r.xyz[0], idle=False) for r in mission.routes}
+    _, memory = director(0.0, states, (), None)
+    states |= {other: replace(states[other], alive=False)}
+    _, memory = director(1.0, states, (Event("lost", other),), memory)
+    _, memory = director(2.0, states, (Event("returned", other), Event("lost", other)), memory)
+    assert [v.id for v in told[-1].vehicles] == [one]
