@@ -9,6 +9,7 @@ import warnings
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -134,6 +135,7 @@ def chart_site(
     dangers = [d for cell in cells for d in _dangers(cell, frame, depth, margin, tuple(avoid), used, ignored)]
     obstacles = unary_union(dangers)
     notes.append("used: " + (", ".join(f"{n} {c}" for c, n in sorted(used.items())) or "no dangers"))
+    notes += [_absent(name, cells) for name in avoid if not any(cell.objects.get(name) for cell in cells)]
     notes.append("ignored: " + (", ".join(f"{n} {c}" for c, n in sorted(ignored.items())) or "nothing"))
     if water.is_empty:
         raise InputError(
@@ -147,6 +149,11 @@ def chart_site(
     spots = _spots(cells, frame, kept)
     notes.append(f"soundings: {len(spots)} in the water that is left, for the swath of a multibeam sonar")
     return Scenario("chart", frame, site, tuple(_vehicle(*s) for s in starts), soundings=spots), tuple(notes)
+
+
+def _absent(name: str, cells: Sequence[Cell]) -> str:
+    near = get_close_matches(name, sorted({n for cell in cells for n in cell.objects}), n=1)
+    return f"avoided: there is no {name} in the chart" + (f"; did you mean {near[0]}?" if near else "")
 
 
 def _spots(cells: Sequence[Cell], frame: Frame, water: BaseGeometry) -> tuple[tuple[float, float, float], ...]:

@@ -54,7 +54,7 @@ class LazyGroup(click.Group):
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Return the commands that begin so, without importing any, and the group's own options."""
-        own = [CompletionItem(name, help=text) for name, text in self.verbs.items() if name.startswith(incomplete)]
+        own = [CompletionItem(name, help=text) for name, text in sorted(self.verbs.items()) if name.startswith(incomplete)]
         return own or click.Command.shell_complete(self, ctx, incomplete)
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:

@@ -7,19 +7,41 @@ import click
 
 from quarterdeck.cli.files import takes
 from quarterdeck.cli.output import force_option, terrain_option, tolerance_option
-from quarterdeck.cli.parameters import Moment, Real
+from quarterdeck.cli.parameters import Choice, Moment, Real
+
+
+def _formats(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[str]:  # noqa: ARG001 - click calls it
+    """Return what completes the last of some formats with commas."""
+    from quarterdeck.exporters.export import FORMATS
+
+    before, comma, last = incomplete.rpartition(",")
+    return [f"{before}{comma}{name}" for name in ("all", *FORMATS) if name.startswith(last)]
 
 
 @click.command(short_help="Autopilot and ECDIS files, recording, pictures.")
 @takes("plan")
-@click.option("--to", "formats", required=True, help="Formats parted by commas, such as qgc-wpl,png; or all.")
+@click.option(
+    "--to", "formats", required=True, shell_complete=_formats, help="Formats parted by commas, such as qgc-wpl,png; or all."
+)
 @click.option("-o", "--out", type=click.Path(), default=".", show_default=True, help="The folder to write into.")
-@click.option("--autopilot", default="ardupilot", show_default=True, help="Whom mission files are for: ardupilot or px4.")
-@click.option("--altitude", default="relative", show_default=True, help="What heights count from: relative, terrain, amsl.")
+@click.option(
+    "--autopilot",
+    type=Choice(["ardupilot", "px4"]),
+    default="ardupilot",
+    show_default=True,
+    help="Whom mission files are for.",
+)
+@click.option(
+    "--altitude",
+    type=Choice(["relative", "terrain", "amsl"]),
+    default="relative",
+    show_default=True,
+    help="What heights count from: home, the terrain, mean sea level.",
+)
 @click.option("--ground", type=Real(), help="Metres of the ground above mean sea level, for amsl.")
 @terrain_option
 @tolerance_option
-@click.option("--storage", type=click.Choice(["4", "8", "15", "16", "32"]), default="16", show_default=True,
+@click.option("--storage", type=Choice(["4", "8", "15", "16", "32"]), default="16", show_default=True,
               help="ArduPilot: the board's storage in kB, which limits mission and fence.")  # fmt: skip
 @click.option("--depart", type=Moment(), help="When the mission begins, ISO 8601: RTZ schedules get times.")
 @click.option("--sorties", is_flag=True, help="Split what is beyond a vehicle's endurance into sorties, a folder each.")
