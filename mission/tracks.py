@@ -44,9 +44,11 @@ def read_tracks(mission: Mission, files: Sequence[str], *, start: float | None =
     return record(mission, [_assigned(mission, given) for given in files], start=start)
 
 
-def _assigned(mission: Mission, given: str) -> list[tuple[str, Log]]:
-    """Return (vehicle, log) of the vehicles of one file."""
-    ids = [v.id for v in mission.vehicles]
+def track_file(ids: Sequence[str], given: str) -> tuple[str, str, str]:
+    """Return vehicle, path and the name in the file of `[VEHICLE=]FILE[#NAME]`, "" for what is not said.
+
+    Raises InputError for a vehicle that is none of `ids`.
+    """
     vehicle, equals, path = given.partition("=")
     if not equals or (vehicle not in ids and Path(given).exists()):
         vehicle, path = "", given
@@ -55,6 +57,13 @@ def _assigned(mission: Mission, given: str) -> list[tuple[str, Log]]:
     name = ""
     if "#" in path and not Path(path).exists():
         path, _, name = path.rpartition("#")
+    return vehicle, path, name
+
+
+def _assigned(mission: Mission, given: str) -> list[tuple[str, Log]]:
+    """Return (vehicle, log) of the vehicles of one file."""
+    ids = [v.id for v in mission.vehicles]
+    vehicle, path, name = track_file(ids, given)
     logs = read_logs(path)
     inside = [log.vehicle for log in logs]
     if name:

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from hashlib import sha256
+from importlib import import_module
 from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -40,7 +41,7 @@ SHOWN = 20  # differences that are printed; --json has all
               help="By what numbers may differ: a fraction, near 0 an amount; 0: to the last digit.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Write all differences as JSON to standard output.")
 def command(file: str, plan: str | None, site: str | None, within: float, as_json: bool) -> int:
-    """Run again what FILE came of, and print what differs: a report of `simulate`, or with --site a PLAN.
+    """Run again what FILE came of, and print what differs: a report of `simulate` or `report`, or with --site a PLAN.
 
     A report's files are looked for where its command had them, from here and from the report's folder and those above it,
     and beside the report; their hashes tell whether they are the same. Exit status 1 if anything differs. Another version
@@ -84,7 +85,7 @@ def _read(file: str) -> Document | dict[str, Any]:
             return dict(parse_json(data))
     except InputError as error:
         raise InputError(f"{file}: {error}") from None
-    raise InputError(f"{file}: is {kind or 'neither a report of `quarterdeck simulate` nor a PLAN'}")
+    raise InputError(f"{file}: is {kind or 'neither a report nor a PLAN'}")
 
 
 def _with_files(report: dict[str, Any], file: str, plan: str | None) -> dict[str, Any]:
@@ -93,13 +94,27 @@ def _with_files(report: dict[str, Any], file: str, plan: str | None) -> dict[str
     Raises InputError if the report tells no command, or one of the files is not found as it was.
     """
     command = report.get("command")
-    options, files = (command.get(name) for name in ("options", "files")) if isinstance(command, dict) else (None, None)
-    if not isinstance(options, dict) or not isinstance(files, dict):
-        raise InputError(f"{file}: does not tell the command that it came of; only those of `quarterdeck simulate` do")
+    given, files = (command.get(name) for name in ("options", "files")) if isinstance(command, dict) else (None, None)
+    if not isinstance(given, dict) or not isinstance(files, dict):
+        raise InputError(f"{file}: does not tell the command that it came of; it was made from Python")
     home = Path(file).resolve().parent
-    options |= {"plan": plan} if plan is not None else {}
-    found = {name: _found(name, str(options.get(name)), was, home, plan) for name, was in files.items()}
-    return {**options, **found}
+    options = given | ({"plan": plan} if plan is not None else {})
+    lay = {name: str(options.get(name, name)) for name in files}  # logs are told by their paths
+    found = {name: _found(name if name in options else "log", lay[name], was, home, plan) for name, was in files.items()}
+    logs = {name: path for name, path in found.items() if name not in options}
+    options |= {name: path for name, path in found.items() if name in options}
+    if isinstance(options.get("tracks"), list):
+        options["tracks"] = [_moved(str(track), logs) for track in options["tracks"]]
+    return options
+
+
+def _moved(track: str, logs: dict[str, str]) -> str:
+    """Return a --track with its log's path as it is now."""
+    for lay, path in logs.items():
+        before, is_it, after = track.partition(lay)
+        if is_it and before[-1:] in ("", "=") and after[:1] in ("", "#"):
+            return before + path + after
+    return track
 
 
 def _found(name: str, lay: str, was: str, home: Path, plan: str | None) -> str:
@@ -121,23 +136,23 @@ def _found(name: str, lay: str, was: str, home: Path, plan: str | None) -> str:
 
 
 def report_again(report: dict[str, Any], options: dict[str, Any], within: float) -> Differences:
-    """Simulate with a report's options and return what differs. Raises InputError if they cannot be used."""
-    from quarterdeck.cli import simulate
-
-    context = click.Context(simulate.command)
+    """Run a report's verb with its options and return what differs. Raises InputError if they cannot be used."""
+    verb = import_module(f"quarterdeck.cli.{'report' if report['command'].get('verb') == 'report' else 'simulate'}")
+    context = click.Context(verb.command)
     try:
         given = {
-            p.name: p.type_cast_value(context, _tuples(options[p.name]))
-            for p in simulate.command.params
-            if p.name in options
+            p.name: p.type_cast_value(context, _tuples(options[p.name])) for p in verb.command.params if p.name in options
         }
     except (click.BadParameter, TypeError, ValueError, AttributeError) as error:  # click's types are for what is typed
-        raise InputError(f"the report's options cannot be used ({error}); simulate the plan again") from None
+        raise InputError(f"the report's options cannot be used ({error}); run its verb again") from None
     try:
-        _, run = simulate.execute(**given)
+        _, run = verb.execute(**given)
     except TypeError as error:  # options that are lacking
-        raise InputError(f"the report's options cannot be used ({error}); simulate the plan again") from None
-    again = json.loads(replace(run.report, command=report["command"], state=report.get("state")).to_json())
+        raise InputError(f"the report's options cannot be used ({error}); run its verb again") from None
+    told = {"command": report["command"], "state": report.get("state")}
+    if verb.__name__.endswith("report"):  # where the logs lie is no difference
+        told["settings"] = {**run.report.settings, "tracks": report["command"]["options"].get("tracks")}
+    again = json.loads(replace(run.report, **told).to_json())
     found = differences(report, again, within)
     return [d for d in found if not (within and d[0] == "trace_hash")]
 

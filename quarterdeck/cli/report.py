@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from hashlib import sha256
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -31,34 +33,19 @@ if TYPE_CHECKING:
 @click.option("--json", "as_json", is_flag=True, help="Write the report as JSON to standard output.")
 @force_option
 def command(
-    plan: str,
-    tracks: tuple[str, ...],
-    start: str | None,
     report: str | None,
     gaps: str | None,
     rrd: str | None,
     picture: str | None,
-    limits: tuple[tuple[str, float], ...],
     as_json: bool,
     force: bool,
+    **options: Any,
 ) -> int:
     """Measure what really happened of PLAN (a file, or - for standard input), by the logs of its vehicles.
 
     Exit status 1 if the verdict fails, or a log is not of this plan.
     """
-    from dataclasses import replace
-    from datetime import UTC, datetime
-
-    from quarterdeck.geo.logs import read_time
-    from quarterdeck.mission.planfile import read_plan
-    from quarterdeck.mission.tracks import read_tracks
-    from quarterdeck.physics.observed import report_tracks, with_state
-
-    mission = read_plan(plan)
-    record = read_tracks(mission, tracks, start=read_time(start) if start else None)
-    began = None if record.start is None else datetime.fromtimestamp(record.start, UTC).isoformat()
-    run = report_tracks(mission, record, limits=dict(limits), settings={"tracks": list(tracks), "start": began})
-    run = replace(run, report=with_state(mission, run.report, record.tracks))
+    mission, run = execute(**options)
     if report:
         emit(run.report.to_json(), report, force=force)
     if rrd:
@@ -75,6 +62,32 @@ def command(
     if gaps:
         _write_gaps(mission, run, gaps, force)
     return 0 if run.report.passed else 1
+
+
+def execute(
+    plan: str, *, tracks: tuple[str, ...], start: str | None, limits: tuple[tuple[str, float], ...]
+) -> tuple[Mission, Run]:
+    """Measure logs with the command's options; return the plan's mission and the run, whose report tells them."""
+    options = dict(locals())
+    from datetime import UTC, datetime
+
+    from quarterdeck.geo.files import read_bytes
+    from quarterdeck.geo.geojson import opened
+    from quarterdeck.geo.logs import read_time
+    from quarterdeck.mission.planfile import read_plan
+    from quarterdeck.mission.tracks import read_tracks, track_file
+    from quarterdeck.physics.observed import report_tracks, with_state
+
+    document = opened(plan)
+    mission = read_plan(document)
+    record = read_tracks(mission, tracks, start=read_time(start) if start else None)
+    began = None if record.start is None else datetime.fromtimestamp(record.start, UTC).isoformat()
+    run = report_tracks(mission, record, limits=dict(limits), settings={"tracks": list(tracks), "start": began})
+    logs = dict.fromkeys(track_file([v.id for v in mission.vehicles], given)[1] for given in tracks)
+    data = {"plan": document.data} | {path: read_bytes(path) for path in logs}
+    files = {name: sha256(content).hexdigest() for name, content in data.items()}
+    report = with_state(mission, run.report, record.tracks)
+    return mission, replace(run, report=replace(report, command={"verb": "report", "options": options, "files": files}))
 
 
 def _write_gaps(mission: Mission, run: Run, gaps: str, force: bool) -> None:

@@ -248,7 +248,7 @@ def execute(
             limits=dict(limits),
             progress=progress,
         )
-    command = {"options": options, "files": files}
+    command = {"verb": "simulate", "options": options, "files": files}
     return mission, replace(run, report=replace(run.report, command=command))
 
 

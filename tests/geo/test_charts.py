@@ -69,6 +69,10 @@ def test_land_walls_marks_and_what_the_user_avoids():
     for lon, lat in ((10.0165, 54.003), (10.019, 54.001)):
         assert free.contains(Point(lon, lat))
     assert not degrees(chart_site([chart], depth=2.0, avoid=["RESARE"])[0]).contains(Point(10.0165, 54.003))
+    assert (
+        "avoided: there is no RESAR in the chart; did you mean RESARE?"
+        in chart_site([chart], depth=2.0, avoid=["RESAR"])[1]
+    )
 
 
 def test_the_larger_scale_wins_where_cells_overlap():

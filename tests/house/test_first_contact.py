@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 
@@ -20,7 +21,12 @@ def run(capsys, *arguments):
 
 
 def completed(*words):
-    """Return what the shell is offered for the last word."""
+    """Return the words that the shell is offered for the last one."""
+    return [word for _, word in offered(*words)]
+
+
+def offered(*words):
+    """Return the kind and the text of what the shell is offered for the last word."""
     environment = os.environ | {
         "_QUARTERDECK_COMPLETE": "bash_complete",
         "COMP_WORDS": " ".join(["quarterdeck", *words]),
@@ -29,7 +35,7 @@ def completed(*words):
     done = subprocess.run(
         [sys.executable, "-m", "quarterdeck"], env=environment, capture_output=True, text=True, check=True
     )
-    return [line.partition(",")[2] for line in done.stdout.splitlines()]
+    return [tuple(line.split(",", 1)) for line in done.stdout.splitlines()]
 
 
 def test_the_first_site_says_what_it_is_for_and_can_be_planned(tmp_path, capsys):
@@ -75,6 +81,28 @@ def test_the_shell_completes_verbs_options_and_words():
     assert completed("re") == sorted(v for v in VERBS if v.startswith("re"))
     assert "--time-limit" in completed("plan", "--ti")
     assert completed("plan", "--method", "g") == ["guards"]
+    assert completed("export", "plan.geojson", "--to", "png,qgc-") == ["png,qgc-plan", "png,qgc-wpl"]
+
+
+@pytest.mark.parametrize("words", [("plan", "si"), ("simulate", "x", "--report", ""), ("report", "x", "--track", "log")])
+def test_the_shell_completes_files(words):
+    """Where a file is wanted the shell completes its name."""
+    assert [kind for kind, _ in offered(*words)] == ["file"]
+
+
+def test_bash_completes(tmp_path):
+    """The line of the README, in a real bash."""
+    bash = shutil.which("bash")
+    if bash is None:
+        pytest.skip("there is no bash")
+    program = tmp_path / "quarterdeck"
+    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m quarterdeck "$@"\n')
+    program.chmod(0o755)
+    script = """eval "$(_QUARTERDECK_COMPLETE=bash_source quarterdeck)"
+        COMP_WORDS=(quarterdeck rep) COMP_CWORD=1; _quarterdeck_completion quarterdeck; echo "${COMPREPLY[@]}" """
+    environment = os.environ | {"PATH": os.pathsep.join([str(tmp_path), os.environ["PATH"]])}
+    done = subprocess.run([bash, "-c", script], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["replan", "replay", "report", "reproduce"]
 
 
 def test_a_name_that_steers_the_terminal_is_told_without_it(tmp_path, capsys):

@@ -57,6 +57,22 @@ def test_a_good_flight_passes(flown, tmp_path, capsys):
     assert rrd.read_bytes()[:4] == b"RRF2"
 
 
+def test_a_report_of_logs_is_had_again_from_anywhere(flown, tmp_path, capsys, monkeypatch):
+    """It tells its verb, options and the hashes of plan and logs; another log in the place of one is refused."""
+    plan, log = flown
+    monkeypatch.chdir(plan.parent)
+    run("report", plan.name, "--track", log.name, "--report", "out/report.json")
+    report = plan.parent / "out" / "report.json"
+    told = json.loads(report.read_text(encoding="utf-8"))["command"]
+    assert (told["verb"], sorted(told["files"])) == ("report", sorted(["plan", log.name]))
+    monkeypatch.chdir(tmp_path)
+    assert run("replay", report) == 0
+    assert "the same again" in capsys.readouterr().err
+    alone = report.rename(tmp_path / "report.json")
+    assert run("replay", alone, "--plan", plan) == 2
+    assert f"{log.name}: the report's log is not there" in capsys.readouterr().err
+
+
 def test_gaps_are_planned_again(flown, tmp_path, capsys):
     """What a flight with a hole in its log leaves is a site that `plan` takes, and exit status 1."""
     plan, log = flown
