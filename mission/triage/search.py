@@ -50,14 +50,15 @@ def search_paths(
     if paths is None:
         raise InputError("the UGVs can enter no part of the field; check the obstacles and the vehicles' clearance")
     missed = _missed(field, paths, starts, sees)
+    least, best = missed.area, paths
     for _ in range(_ROUNDS):
-        if missed.area < 1e-6 * field.area:
+        if least < 1e-6 * field.area:
             break
         paths = _with_visits(paths, _places(missed, room, sees), ways)
-        before, missed = missed.area, _missed(field, paths, starts, sees)
-        if missed.area >= before:
-            break
-    return Search(paths, float(missed.area) if missed.area >= 1e-6 * field.area else 0.0)
+        missed = _missed(field, paths, starts, sees)  # it may grow at first: a detour leaves the leg that it is put into
+        if missed.area < least:
+            least, best = missed.area, paths
+    return Search(best, float(least) if least >= 1e-6 * field.area else 0.0)
 
 
 def _tours(room: MultiPolygon, starts: tuple[XY, ...], spacing: float) -> tuple[np.ndarray, ...] | None:

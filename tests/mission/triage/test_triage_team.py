@@ -1,15 +1,18 @@
 """What a triage scenario must have, each lack told in one line."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from shapely import LineString, MultiPolygon, box
 
 from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.reader import read_scenario
 from quarterdeck.geo.scenario import Casualty, Obstacle, Scenario, Site
 from quarterdeck.mission.triage.generate import generate, paper_team
 from quarterdeck.mission.triage.outcome import run_triage
 from quarterdeck.mission.triage.settings import METHODS, Settings
+from quarterdeck.mission.triage.team import make_team
 from quarterdeck.mission.world import Fault
 
 
@@ -51,6 +54,13 @@ def test_what_lacks_is_one_clear_line(change, words) -> None:  # type: ignore[no
     with pytest.raises(InputError, match=words) as error:
         run_triage(change(walled()))
     assert "\n" not in str(error.value)
+
+
+def test_all_of_the_sample_is_searched() -> None:
+    """A detour to what tours leave out takes the UGV off the leg that it is put into: that is made up for."""
+    scenario = read_scenario(Path(__file__).parents[3] / "data" / "triage_drill.geojson")
+    for bodies in (False, True):
+        assert make_team(scenario, "relay", Settings(), bodies=bodies).search.missed == 0
 
 
 def test_no_uav_is_needed_without_a_relay() -> None:
