@@ -46,7 +46,8 @@ class _Memory:
     told of the plan: how far they say to have come is how far they had come by the one before it. `sent` are the waypoints
     that each was commanded last, `serving` the task that it is at by them, and since when. `wrecks` are the ids that those
     who were given up have as obstacles, by vehicle, `found` the ids of what robots have found. `tellings` are all routes
-    told anew so far. `courses` say how each gets on with what it was commanded last.
+    told anew so far, `reliefs` how far those had come whose part was given to others. `courses` say how each gets on with
+    what it was commanded last.
     """
 
     mission: Mission
@@ -68,6 +69,7 @@ class _Memory:
     wrecks: Mapping[str, str] = field(default_factory=dict)
     found: frozenset[str] = frozenset()
     tellings: tuple[Telling, ...] = ()
+    reliefs: Mapping[str, Telling] = field(default_factory=dict)
     courses: Mapping[str, Course] = field(default_factory=dict)
 
 
@@ -211,6 +213,8 @@ def _replanned(
     told = {r.vehicle: r for r in after.routes if states[r.vehicle].alive}
     # A plan numbers what is new and has the name of something else.
     ids = [o.id for o in after.site.obstacles[len(after.site.obstacles) - len(changes.obstacles) :]]
+    over = {v: Route(v, (Waypoint(s.x, s.y, s.z, "start"),)) for v, s in states.items() if v in changes.lost}
+    reliefs = {**now.reliefs, **{v: _telling(now, time, states[v], route, after) for v, route in over.items()}}
     left = (*now.undone, *undone(now.inner), *(r for r in after.reasons if r.kind == "undone"))
     return replace(
         now,
@@ -230,6 +234,7 @@ def _replanned(
         wrecks={v: i for v, i in now.wrecks.items() if v not in afloat} | dict(zip(new, ids, strict=False)),
         found=frozenset(ids[len(new) :]) if found else now.found,
         tellings=(*now.tellings, *(_telling(now, time, states[v], route, after) for v, route in told.items())),
+        reliefs={v: relief for v, relief in reliefs.items() if v in now.given_up},
     )
 
 
@@ -251,6 +256,20 @@ def tellings(memory: Any) -> tuple[Telling, ...]:
     if isinstance(memory, Contact):
         return tellings(memory.inner)
     return memory.tellings if isinstance(memory, _Memory) else ()
+
+
+def relieved(memory: Any) -> dict[str, Telling]:
+    """Return of each vehicle that was given up how far it had come when its part was given to others."""
+    if isinstance(memory, Contact):
+        return relieved(memory.inner)
+    return dict(memory.reliefs) if isinstance(memory, _Memory) else {}
+
+
+def left_out(memory: Any) -> tuple[Reason, ...]:
+    """Return what the last plan told, by a director that replans, said of what can't be done any more."""
+    if isinstance(memory, Contact):
+        return left_out(memory.inner)
+    return memory.mission.reasons if isinstance(memory, _Memory) and memory.tellings else ()
 
 
 def undone(memory: Any) -> tuple[Reason, ...]:

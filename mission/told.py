@@ -15,6 +15,7 @@ SAME = 0.5  # m: legs so much farther away than the nearest may be the one that 
 class Telling:
     """A vehicle is told a new route, `time` seconds after the mission's start, of a plan with these `guards`.
 
+    One waypoint, where it is, says that it is given up.
     It is at `place`, (x, y, z) metres, has passed `reached` waypoints of the route that it had, and used `energy` Wh.
     """
 

@@ -1,7 +1,7 @@
 """The verdict: what a run comes to, beside what was planned and what is allowed."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from difflib import get_close_matches
 from functools import cache
@@ -28,7 +28,7 @@ from quarterdeck.physics.trace import Trace
 LIMITS: dict[str, tuple[float | None, str]] = {
     "coverage_loss": (0.01, "covered by the plan and not by the driven tracks, as a fraction of the area"),
     "collisions": (0, "vehicles that touched or went through anything"),
-    "unfinished": (0, "vehicles that did not finish their routes"),
+    "unfinished": (0, "vehicles that did not finish their routes (one whose part was given to others is only told)"),
     "unserved": (0, "tasks of the plan not served"),
     "cross_track": (None, "95 % of cross-track errors on straight legs, m (default: half the vehicle's clearance)"),
     "outside": (None, "how far a vehicle left the operating area, m (default: half its clearance)"),
@@ -103,8 +103,8 @@ class VehicleReport:
 class Report:
     """A run's figures, the limits that they were held against, and why it failed (`reasons`; it passed when there are
     none). `command` has the `options` of the command line that it came of, and the SHA-256 of the `files` among them.
-    `notes` say what of a log was left out or reckoned; a simulated run has none. `state` is where its end leaves the
-    mission (`mission.recorded.progress_state`), for `replan --state`.
+    `notes` say what of a log was left out or reckoned; of a simulated run, who was lost, and what nobody could do then.
+    `state` is where its end leaves the mission (`mission.recorded.progress_state`), for `replan --state`.
     """
 
     mission: str
@@ -170,6 +170,8 @@ def measure(
     triage: Mapping[str, Any] | None = None,
     servers: Mapping[str, str] | None = None,
     undone: Sequence[Reason] = (),
+    relieved: Mapping[str, float] | None = None,
+    left_out: Sequence[Reason] = (),
     fast: FastRun | None = None,
 ) -> Report:
     """Measure a trace against the mission and judge it.
@@ -177,7 +179,9 @@ def measure(
     `finished` and `aground` are (k,), `served` the times at which tasks were, `lost` (k,) the vehicles lost by a fault
     (default: none), `trouble` what went wrong, a line each, `localisation` what `Senses.report` returns, `notes` what is
     told of a log, `triage` what `triage.Compared.document` returns; `servers` the vehicles that served tasks, `undone` why
-    others were not served, as `task_reports` takes them; `fast` what the fast world came to.
+    others were not served, as `task_reports` takes them; `fast` what the fast world came to. `relieved` are vehicles that
+    were lost and when their part was given to others, `left_out` what the plan by then told that nobody can do any more:
+    a loss that was recovered from is told, and does not fail the run.
     Raises InputError for an unknown limit.
     """
     allowed = check_limits(limits)
@@ -193,15 +197,19 @@ def measure(
     places = [None if localisation is None else Localisation(**localisation[i]) for i in range(len(vehicles))]
     vehicles = tuple(replace(v, lost=g, localisation=p) for v, g, p in zip(vehicles, gone, places, strict=True))
     figures = _figures(mission, trace, vehicles, served)
-    reasons = [*trouble, *_reasons(mission, vehicles, figures, allowed)]
+    over = relieved or {}
+    reasons = [*trouble, *_reasons(mission, vehicles, figures, allowed, over)]
     tasks = task_reports(mission, trace, served, servers or {}, undone)
     if fast is not None:
         figures |= {"time_fast": fast.time, "tasks_served_fast": len(fast.served.keys() & {t.id for t in tasks})}
         vehicles = tuple(replace(v, time_fast=fast.times[v.id]) for v in vehicles)
         tasks = tuple(replace(t, fast=fast.served.get(t.id)) for t in tasks)
-    reasons += [f"task {t.id!r} not served: {t.reason}" for t in tasks if t.reason] if allowed["unserved"] == 0 else []
+    told = [f"{v}: lost; at {time:.0f} s others were given its part" for v, time in over.items()]
+    told += map(str, left_out) if over else []
+    excused = {r.about for r in left_out if r.kind == "undone"} if over else set()
+    missed = [t for t in tasks if t.reason and t.id not in excused]
+    reasons += [f"task {t.id!r} not served: {t.reason}" for t in missed] if allowed["unserved"] == 0 else []
     reasons += [str(r) for r in undone if r.kind != "undone"]
-    told = tuple(reasons)
     return Report(
         mission.name,
         VERSION,
@@ -209,10 +217,10 @@ def measure(
         allowed,
         figures,
         vehicles,
-        told,
+        tuple(reasons),
         trace.hash,
         tasks,
-        notes=tuple(notes),
+        notes=(*notes, *told),
         triage=triage,
     )
 
@@ -316,7 +324,11 @@ def _figures(
 
 
 def _reasons(
-    mission: Mission, vehicles: Sequence[VehicleReport], figures: Mapping[str, Any], allowed: Mapping[str, float | None]
+    mission: Mission,
+    vehicles: Sequence[VehicleReport],
+    figures: Mapping[str, Any],
+    allowed: Mapping[str, float | None],
+    relieved: Collection[str],
 ) -> list[str]:
     reasons: list[str] = []
 
@@ -334,7 +346,7 @@ def _reasons(
         )
     touched = [v.id for v in vehicles if v.touched or v.hits]
     over("collisions", len(touched), f"collision: {_list(touched)}")
-    late = [v.id for v in vehicles if not v.finished]
+    late = [v.id for v in vehicles if not v.finished and v.id not in relieved]
     over("unfinished", len(late), f"did not finish: {_list(late)}")
     unserved = figures["tasks_planned"] - figures["tasks_served"]
     over("unserved", unserved, f"{unserved} of {figures['tasks_planned']} tasks not served")

@@ -15,7 +15,7 @@ from quarterdeck.mission.director import Director
 from quarterdeck.mission.fast import run_fast
 from quarterdeck.mission.inspection import default_director
 from quarterdeck.mission.mission import Mission
-from quarterdeck.mission.recovery import tellings, undone
+from quarterdeck.mission.recovery import left_out, relieved, tellings, undone
 from quarterdeck.mission.served import served_tasks
 from quarterdeck.mission.told import as_told
 from quarterdeck.mission.triage.plan import METHOD, run_plan
@@ -147,7 +147,9 @@ def simulate(
         "unmapped": [o.id for o in sensing.unmapped],
         "world": None if sensing.world is None else [o.id for o in sensing.world],
     }
-    told = as_told(plan, tellings(run.memory))
+    dead = {v for v, gone in zip(ids, (run.lost | run.aground).tolist(), strict=True) if gone}
+    reliefs = [relief for v, relief in relieved(run.memory).items() if v in dead]
+    told = as_told(plan, (*tellings(run.memory), *reliefs))
     served, servers = run.served, run.servers
     if told is not plan and plan.method == "guards":  # each plan numbers its guards anew
         found = served_tasks(told, trace.tracks())
@@ -166,6 +168,8 @@ def simulate(
         triage=compared.document() if compared else None,
         servers=servers,
         undone=undone(run.memory),
+        relieved={r.route.vehicle: r.time for r in reliefs},
+        left_out=left_out(run.memory),
         fast=fast,
     )
     made = None

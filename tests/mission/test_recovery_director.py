@@ -154,23 +154,6 @@ def test_new_routes_begin_where_the_vehicles_are(reach, fault):
     assert began == {v.id for v in mission.vehicles if fault.until < inf or v.id != fault.actor}
 
 
-def test_a_slow_vehicle_is_found_and_relieved():
-    """With half the wheels at half power others take over, so that all are done sooner, and all is covered."""
-    pytest.importorskip("pybullet", reason="PyBullet is not installed")
-    from quarterdeck.physics.simulate import simulate
-
-    mission, fault = plan("plant_yard", 8.0), "thruster:ugv-2@100"
-    plain = simulate(mission, faults=[fault], sample=1.0, duration=2000.0).report.figures
-    told = []
-    run = simulate(mission, director=recovering(mission, tell=lambda *plan: told.append(plan)), faults=[fault], sample=1.0)
-    [(time, after)] = told
-    assert 100.0 < time < 200.0
-    assert after.vehicle("ugv-2").speed == pytest.approx(0.5, abs=0.1)
-    assert after.vehicle("ugv-1").speed == mission.vehicle("ugv-1").speed
-    assert run.report.figures["time"] < plain["time"] - 60.0
-    assert run.report.figures["coverage_driven"] > plain["coverage_planned"] - 0.01
-
-
 def test_who_is_heard_and_lost_in_one_second_is_lost():
     """A vehicle that was silent, is heard again and stops, all between two looks, is given no route."""
     mission = plan("plant_yard")
