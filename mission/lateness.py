@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import dist
 
 import numpy as np
 
@@ -46,17 +47,22 @@ def looked(course: Course, vehicle: Vehicle, state: State, time: float) -> Cours
     """Return the course with what is seen at `time`, where that is due. While it holds or is silent nothing is seen."""
     if time < course.look:
         return course
-    ahead = course.route.waypoints[state.reached : state.reached + 2]
-    if not state.alive or state.idle or len(ahead) < 2:
+    end = next(iter(course.route.waypoints[state.reached + 1 : state.reached + 2]), None)
+    holds = end is not None and end.hold > 0 and dist((end.x, end.y), (state.x, state.y)) <= 2 * vehicle.model.length
+    if not state.alive or state.idle or end is None or holds:
         return replace(course, since=time, seen=())
-    here, end = np.array((state.x, state.y, state.z)), ahead[1]
-    a, b = (np.array((w.x, w.y, w.z)) for w in ahead)
-    length, left = float(np.linalg.norm(b - a)), float(np.linalg.norm(b - here))
-    if left <= 2 * vehicle.model.length and end.hold > 0:
-        return replace(course, since=time, seen=())
+    return replace(course, seen=(*course.seen, (time, done(course.route, state), state.x, state.y))[-WINDOWS - 1 :])
+
+
+def done(route: Route, state: State) -> float:
+    """Return the seconds of a route that are behind a vehicle, by the waypoints that it has reached and where it is."""
+    if state.reached + 1 >= len(route.waypoints):
+        return route.duration
+    start, end = route.waypoints[state.reached : state.reached + 2]
+    length = dist((start.x, start.y, start.z), (end.x, end.y, end.z))
+    left = dist((end.x, end.y, end.z), (state.x, state.y, state.z))
     drive = length / end.speed if end.speed > 0 else 0.0  # what is left of the leg's time is for the turn before it
-    done = end.time - drive * (min(1.0, left / length) if length > 0 else 0.0)
-    return replace(course, seen=(*course.seen, (time, float(done), state.x, state.y))[-WINDOWS - 1 :])
+    return end.time - drive * (min(1.0, left / length) if length > 0 else 0.0)
 
 
 def measured_pace(course: Course, vehicle: Vehicle) -> float:

@@ -49,15 +49,17 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """At `time` seconds an actor stops for ever (`stop`), or goes on, its radio silent (`mute`) `until` it is heard again.
+    """At `time` seconds an actor stops for ever (`stop`), or goes on, `until` then, its radio silent (`mute`) or, without a
+    word of it, at `pace` times its speed (`slow`).
 
     Who is silent still moves past others: it is for the director to let nothing pass between them.
     """
 
     actor: str
     time: float
-    kind: Literal["stop", "mute"] = "stop"
+    kind: Literal["stop", "mute", "slow"] = "stop"
     until: float = inf
+    pace: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +113,10 @@ def run_world(
     contact = [False] * len(pairs)
     switch = [inf] * len(pairs)
     alive = [True] * n
-    changes = [(f.time, f.actor, f.kind) for f in faults] + [(f.until, f.actor, "heard") for f in faults if f.until < inf]
+    pace = [1.0] * n
+    over = {"mute": "heard", "slow": "slow"}
+    changes: list[tuple[float, str, str, float]] = [(f.time, f.actor, f.kind, f.pace) for f in faults]
+    changes += [(f.until, f.actor, over[f.kind], 1.0 / f.pace) for f in faults if f.until < inf and f.kind in over]
     pending = sorted(changes)
     log: list[tuple[float, Event]] = []
 
@@ -144,6 +149,7 @@ def run_world(
                 here = states[name]
                 tracks[i].append(_until(plans[i].knots, now))
                 plans[i] = _Plan(now, here.x, here.y, actors[i], command, here.energy_used)
+                plans[i].change_pace(now, pace[i])
         for name in commands:
             look_ahead(index[name], now)
 
@@ -165,9 +171,14 @@ def run_world(
             raise RuntimeError(f"the director does not let time pass at {now:.3f} s")
         now, events = max(then, now), []
         while pending and pending[0][0] <= now + SAME:
-            _, name, kind = pending.pop(0)
+            _, name, kind, times = pending.pop(0)
             i = index[name]
             if not alive[i]:
+                continue
+            if kind == "slow":
+                pace[i] *= times
+                plans[i].change_pace(now, times)
+                look_ahead(i, now)
                 continue
             if kind == "stop":
                 here = _state(plans[i], 0.0, now, True)
@@ -223,6 +234,18 @@ class _Plan:
         self.knots = np.array(knots)
         self.end = time
         self.told = not self.served  # the director knows that it is idle
+
+    def change_pace(self, now: float, times: float) -> None:
+        """Move from now on at so many times the speed; what is waited for takes as long as it does."""
+        if times == 1.0:
+            return
+        before = self.knots[:, 0].copy()
+        moves = np.abs(np.diff(self.knots[:, 1:], axis=0)).max(axis=1, initial=0.0) > 0
+        ahead = np.clip(before[1:] - np.maximum(before[:-1], now), 0.0, None)
+        self.knots[1:, 0] += np.cumsum(np.where(moves, ahead * (1.0 / times - 1.0), 0.0))
+        self.served = np.interp(self.served, before, self.knots[:, 0]).tolist()
+        self.tasks = [(float(np.interp(when, before, self.knots[:, 0])), task) for when, task in self.tasks]
+        self.end = float(np.interp(self.end, before, self.knots[:, 0]))
 
     def next_stop(self) -> float:
         """Return when a task of it is over or, if the director does not know yet, all of it; infinity if never."""

@@ -70,7 +70,7 @@ class Localisation:
 class VehicleReport:
     """One vehicle's run. Times s, energies Wh, distances m; `touched` counts separate contacts that PyBullet told of,
     `hits` names the obstacles that the hull went through by the swept-path check; None where there is nothing to be
-    near to. `time_fast` is its time in the fast world.
+    near to. `time_fast` and `energy_fast` are what it took in the fast world.
     """
 
     id: str
@@ -97,6 +97,7 @@ class VehicleReport:
     lost: bool = False
     localisation: Localisation | None = None
     time_fast: float | None = None
+    energy_fast: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,8 +202,8 @@ def measure(
     reasons = [*trouble, *_reasons(mission, vehicles, figures, allowed, over)]
     tasks = task_reports(mission, trace, served, servers or {}, undone)
     if fast is not None:
-        figures |= {"time_fast": fast.time, "tasks_served_fast": len(fast.served.keys() & {t.id for t in tasks})}
-        vehicles = tuple(replace(v, time_fast=fast.times[v.id]) for v in vehicles)
+        figures |= _fast_figures(mission, fast) | {"tasks_served_fast": len(fast.served.keys() & {t.id for t in tasks})}
+        vehicles = tuple(replace(v, time_fast=fast.times[v.id], energy_fast=fast.energy[v.id]) for v in vehicles)
         tasks = tuple(replace(t, fast=fast.served.get(t.id)) for t in tasks)
     told = [f"{v}: lost; at {time:.0f} s others were given its part" for v, time in over.items()]
     told += map(str, left_out) if over else []
@@ -320,6 +321,21 @@ def _figures(
         "length": sum(v.length for v in vehicles),
         "lost": sum(v.lost for v in vehicles),
         "localisation_p95": max((v.localisation.p95 for v in vehicles if v.localisation), default=None),
+    }
+
+
+def _fast_figures(mission: Mission, fast: FastRun) -> dict[str, float | int | None]:
+    """What the fast world came to, by the measures of the run."""
+    covered = None
+    if mission.spacing is not None and any(route.survey.any() for route in mission.routes):
+        covered = covered_fraction(fast.surveyed, mission.site.coverable, mission.spacing)
+    elif mission.method == "guards":
+        covered = seen_fraction(mission, [LineString(track[:, 1:]) for track in fast.tracks.values() if len(track) > 1])
+    return {
+        "time_fast": fast.time,
+        "coverage_fast": covered,
+        "finished_fast": len(fast.finished),
+        "energy_fast": sum(fast.energy.values()),
     }
 
 

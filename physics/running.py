@@ -284,6 +284,7 @@ class Running:
         self.lost[i] = True
         squad.command(place, ())
         squad.scale[place] = 0.0
+        squad.parameters["idle"][place] = 0.0
         self.events.append(Event("lost", self.ids[i], data={"kind": "stop"}))
 
     def _sense(self, senses: Senses) -> None:

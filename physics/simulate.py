@@ -71,8 +71,8 @@ def simulate(
     instead of known (default: all is known). `terrain` is the ground (default: flat). `limits` change the verdict's
     (see report.LIMITS). The run ends when every vehicle is done, or after `duration` seconds (default: twice the planned
     time and ten minutes; of all vehicles' times together where a director may replan). `progress` is told seconds done and
-    expected. Under `expected`, such as `director` without its side effects (default, where no director is given: the
-    schedule of a plan of tasks), the mission is run in the fast world too, and stands beside the run in the report.
+    expected. Under `expected`, such as `director` without its side effects (default without a director: the plan's), the
+    mission is run in the fast world too, and stands beside the run in the report.
 
     Raises InputError for a vehicle model without its dynamics or a wrong option, UnavailableError where PyBullet is
     absent.
@@ -92,11 +92,12 @@ def simulate(
         # Its routes are those without a find; what casualties add to them shows only in the run.
         until = max(until, TRIAGE) if duration is None else until
         limits = {"delay": LATE} | dict(limits or {})
-    if expected is None and director is None and mission.method == "assign":
+    if expected is None and director is None:
         expected = default_director(mission)
     # Before the run, whose time may be limited: what it is held against is not cut short with it.
-    aside = run_plan(mission, in_fast_world(befalling)) if triage else None
-    fast = run_fast(mission, expected, in_fast_world(befalling), until=until) if expected and not triage else None
+    known_faults = in_fast_world(befalling, {v.id: v.domain for v in mission.vehicles})
+    aside = run_plan(mission, known_faults) if triage else None
+    fast = run_fast(mission, expected, known_faults, until=until) if expected and not triage else None
     known, director = mission.site, director or default_director(mission)
     there = known.obstacles if sensing.world is None else sensing.world
     plan, mission = mission, replace(mission, site=replace(known, obstacles=(*there, *sensing.unmapped)))
@@ -127,7 +128,7 @@ def simulate(
     compared = None
     if aside is not None:
         late = cut or ("" if run.done else f"the mission was not over after {until:,.0f} s")
-        compared = compare(mission, run.memory, trace, befalling, late, aside)
+        compared = compare(mission, run.memory, trace, late, aside)
         mission = compared.expected
     elif cut:
         run.trouble.append(cut)

@@ -12,7 +12,7 @@ from quarterdeck.mission.mission import Mission, Route, Waypoint
 from quarterdeck.mission.triage.figures import figures
 from quarterdeck.mission.triage.outcome import Fate, Outcome, judge
 from quarterdeck.mission.triage.plan import scenario_of, settings_of, team_of
-from quarterdeck.physics.faults import Fault, in_fast_world
+from quarterdeck.physics.faults import Fault
 from quarterdeck.physics.trace import Trace
 
 TIMES = ("found", "reported", "delivered", "reached", "treated")
@@ -42,7 +42,7 @@ def of_devices(faults: Sequence[Fault], mission: Mission) -> tuple[Fault, ...]:
     return tuple(replace(f, kind="comms") if f.kind == "lost" and f.vehicle in medics else f for f in faults)
 
 
-def compare(mission: Mission, memory: Any, trace: Trace, faults: Sequence[Fault], reason: str, fast: Outcome) -> Compared:
+def compare(mission: Mission, memory: Any, trace: Trace, reason: str, fast: Outcome) -> Compared:
     """Return what became of the casualties in a run that left `trace` and the director's `memory`, beside the `fast` world.
 
     `reason` says why the run was cut short, if it was.
@@ -51,7 +51,7 @@ def compare(mission: Mission, memory: Any, trace: Trace, faults: Sequence[Fault]
     run = world.Run(tracks, (), float(trace.time[-1]), memory, reason)
     scenario, team, settings = scenario_of(mission), team_of(mission), settings_of(mission)
     driven = judge(scenario, team, mission.parameters["method"], settings, run, seed=mission.seed)
-    driven = replace(driven, faults=tuple(in_fast_world(faults)))
+    driven = replace(driven, faults=fast.faults)
     routes = tuple(_as_route(v, fast.run.tracks[v.id]) for v in mission.vehicles)
     return Compared(driven, fast, replace(mission, routes=routes))
 

@@ -100,7 +100,8 @@ def run_team(
         known = {*names, *(v.id for v in scenario.vehicles)}
         if fault.actor not in known:
             raise InputError(f"--fail {fault.actor}: nobody has this name; use one of {', '.join(sorted(known))}")
-    faults = [replace(f, kind="mute") if f.actor in team.medics else f for f in faults if f.actor in names]
+    faults = [f for f in faults if f.actor in names]
+    faults = [replace(f, kind="mute") if f.actor in team.medics and f.kind == "stop" else f for f in faults]
     actors = team.actors(settings)
     robots = len(team.ugvs)
     # What UGVs have to tell each other, they tell while they wait together: the moment of their meeting is nothing.

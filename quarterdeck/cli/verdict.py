@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from quarterdeck.physics.task_report import TaskReport
 
 
-POINTS = "points that turn at once and give way to nobody"  # the fast world, in plain words
+# The fast world, in plain words: of triage, and of what has a plan's paces.
+POINTS = "points that turn at once and give way to nobody"
+PACED = "points that keep the plan's paces and give way to nobody"
 
 
 def print_report(mission: Mission, report: Report, *, how: str = "simulated") -> None:
@@ -47,9 +49,6 @@ def print_report(mission: Mission, report: Report, *, how: str = "simulated") ->
         words.append(f"coverage {figures['coverage_driven']:.2%} driven of {figures['coverage_planned']:.2%} planned")
     if figures["tasks_planned"]:
         words.append(f"tasks {figures['tasks_served']} of {figures['tasks_planned']} served")
-    if (fast := figures.get("time_fast")) is not None:
-        tasks = f", {figures['tasks_served_fast']} tasks" if report.tasks else ""
-        words.append(f"took {minutes(figures['time'] or 0.0)} ({minutes(fast)}{tasks} if all were {POINTS})")
     words.append(f"collisions {figures['collisions']}")
     words.append(f"finished {figures['finished']} of {len(report.vehicles)}")
     if figures["lost"]:
@@ -62,6 +61,8 @@ def print_report(mission: Mission, report: Report, *, how: str = "simulated") ->
             f"{figures['map_walls_right']:.1%} of the walls"
         )
     screen.print("; ".join(words))
+    if (fast := figures.get("time_fast")) is not None:
+        _print_beside(screen, report, fast)
     for note in report.notes:
         print_reason(screen, "note", note)
     if report.triage is not None:
@@ -72,6 +73,19 @@ def print_report(mission: Mission, report: Report, *, how: str = "simulated") ->
         print_reason(screen, "failed", reason)
     if report.passed:
         screen.print("passed", style="bold")
+
+
+def _print_beside(screen: Console, report: Report, fast: float) -> None:
+    """Print what the run came to beside what it would be in the fast world."""
+    figures = report.figures
+    words = [f"time {minutes(figures['time'] or 0.0)} ({minutes(fast)})"]
+    if figures["coverage_fast"] is not None and figures["coverage_driven"] is not None:
+        words.append(f"coverage {figures['coverage_driven']:.2%} ({figures['coverage_fast']:.2%})")
+    if report.tasks:
+        words.append(f"tasks {sum(t.driven is not None for t in report.tasks)} ({figures['tasks_served_fast']})")
+    words.append(f"finished {figures['finished']} ({figures['finished_fast']})")
+    words.append(f"energy {figures['energy']:,.1f} Wh ({figures['energy_fast']:,.1f} Wh)")
+    screen.print(f"{', '.join(words)}; in brackets, if all were {PACED}")
 
 
 def _print_triage(screen: Console, triage: Mapping[str, Any]) -> None:
