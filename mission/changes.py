@@ -21,7 +21,7 @@ from quarterdeck.mission.mission import Mission
 
 # What each role's features can say beside `add`; `set` with the properties that it may give.
 EDITS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
-    "vehicle": {"remove": ("since",), "set": ("speed", "speed_factor"), "back": ()},
+    "vehicle": {"remove": ("since",), "set": ("speed", "speed_factor", "battery", "endurance"), "back": ()},
     "obstacle": {"remove": ()},
     "area": {"remove": (), "set": ("priority",)},
     "task": {"remove": (), "set": ("priority", "service_time", "window")},
@@ -35,7 +35,8 @@ class Changes:
 
     `lost` vehicles did nothing any more from `since` on (seconds of the plan, by id; now where none is given). `back` are
     vehicles that were given up and work again, with where they are, (x, y) metres, or None for where they were last.
-    `speeds` in m/s, `priorities` of areas, `edited` tasks in the place of those of the same id; `operating` is added.
+    `speeds` in m/s, `batteries` Wh and `endurances` s that vehicles have left, `priorities` of areas, `edited` tasks in the
+    place of those of the same id; `operating` is added.
     """
 
     lost: frozenset[str] = frozenset()
@@ -48,6 +49,8 @@ class Changes:
     since: Mapping[str, float] = field(default_factory=dict)
     back: Mapping[str, tuple[float, float] | None] = field(default_factory=dict)
     speeds: Mapping[str, float] = field(default_factory=dict)
+    batteries: Mapping[str, float] = field(default_factory=dict)
+    endurances: Mapping[str, float] = field(default_factory=dict)
     priorities: Mapping[str, int] = field(default_factory=dict)
     edited: tuple[Task, ...] = ()
     operating: MultiPolygon = field(default_factory=MultiPolygon)
@@ -187,7 +190,7 @@ def _set(edit: _Edit, names: tuple[str, ...], mission: Mission) -> Changes:
     if edit.role == "area":
         return Changes(priorities={edit.id: given["priority"]})
     if edit.role == "vehicle":
-        if factor is not None and given:
+        if factor is not None and "speed" in given:
             raise InputError(f"{edit.place}: give speed or speed_factor, not both")
         if (
             isinstance(factor, bool)
@@ -195,8 +198,12 @@ def _set(edit: _Edit, names: tuple[str, ...], mission: Mission) -> Changes:
             or (factor is not None and not factor > 0)
         ):
             raise InputError(f"{edit.place}: speed_factor must be a number above 0, not {str(factor)[:40]!r}")
-        speed = given["speed"] if factor is None else factor * mission.vehicle(edit.id).speed
-        return Changes(speeds={edit.id: float(speed)})
+        if factor is not None:
+            given["speed"] = factor * mission.vehicle(edit.id).speed
+        speeds, batteries, endurances = (
+            {edit.id: float(given[name])} if name in given else {} for name in ("speed", "battery", "endurance")
+        )
+        return Changes(speeds=speeds, batteries=batteries, endurances=endurances)
     task = next(t for t in mission.tasks if t.id == edit.id)
     if "window" in given:
         low, high = map(float, given["window"])
@@ -221,7 +228,7 @@ def check_changes(mission: Mission, changes: Changes) -> None:
     ids, lost = [v.id for v in mission.vehicles], [v.id for v in mission.lost]
     areas, tasks = [a.id for a in site.areas], [t.id for t in mission.tasks]
     for what, named, known in (
-        ("vehicle", {*changes.lost, *changes.speeds}, [*ids, *changes.back]),
+        ("vehicle", {*changes.lost, *_set_anew(changes)}, [*ids, *changes.back]),
         ("obstacle", changes.gone, [o.id for o in site.obstacles]),
         ("area or task", changes.withdrawn, [*areas, *tasks]),
         ("area", changes.priorities, areas),
@@ -232,7 +239,7 @@ def check_changes(mission: Mission, changes: Changes) -> None:
         if name in ids:
             raise InputError(f"vehicle {name!r} is back, but the plan never gave it up; leave that out")
         _known("vehicle that was given up", name, lost)
-    both = changes.lost & {*changes.speeds, *changes.back}
+    both = changes.lost & {*_set_anew(changes), *changes.back}
     if both:
         raise InputError(f"vehicle {min(both)!r} is lost and works at once; leave one of the two out")
     models = {v.id: v.model for v in (*mission.vehicles, *mission.lost)}
@@ -247,6 +254,11 @@ def check_changes(mission: Mission, changes: Changes) -> None:
             raise InputError(f"area {of_areas[0]!r}: a plan of tasks covers no areas; make one with `quarterdeck plan`")
     elif changes.tasks or changes.edited or changes.withdrawn - {*areas}:
         raise InputError(f"a plan made by {mission.method!r} does no tasks; a plan of `quarterdeck assign` does")
+
+
+def _set_anew(changes: Changes) -> set[str]:
+    """Return the vehicles of which something is set."""
+    return {*changes.speeds, *changes.batteries, *changes.endurances}
 
 
 def _check_new(mission: Mission, changes: Changes, working: Collection[str]) -> None:

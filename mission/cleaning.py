@@ -37,28 +37,36 @@ def cleaned(mission: Mission, vehicle: Vehicle, log: Log) -> tuple[Track | None,
     kept = kept[away <= FAR]
     time = log.time[kept]
     rising = _rising(time)
+    cut = np.r_[False, np.diff(np.flatnonzero(rising)) > 1]  # the clock went back before it
     back = int(np.count_nonzero(np.diff(time) < 0))
     if back:
         left = len(time) - int(np.count_nonzero(rising))
         at = float(time[np.flatnonzero(np.diff(time) < 0)[0] + 1] - time[0])
-        notes.append(f"{who}: its clock goes back {back} times, first {at:,.0f} s into it; {left:,} positions are left out")
+        often = f"{back} times, first" if back > 1 else "once,"
+        notes.append(f"{who}: its clock goes back {often} {at:,.0f} s into it; {left:,} positions are left out")
+    told_back = len(notes) - 1
     kept, time = kept[rising], time[rising]
     days = np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) > DAY) + 1)
     if len(days) > 1:
         most = max(days, key=len)
         notes.append(f"{who}: {len(time) - len(most):,} positions are more than a day from the rest and left out")
-        kept, time = kept[most], time[most]
+        kept, time, cut = kept[most], time[most], cut[most]
     xy = mission.frame.to_metres(np.column_stack([log.lon[kept], log.lat[kept]]))
     good, leapt, told = _without_leaps(xy, time, 2 * vehicle.model.max_speed, who)
     notes += told
-    kept, time, xy = kept[good], time[good], xy[good]
+    kept, time, xy, cut = kept[good], time[good], xy[good], cut[good]
     silence = np.diff(time)
     gaps = silence > max(GAP, OFTEN * float(np.median(silence))) if len(silence) else np.zeros(0, bool)
-    if gaps.any():
-        first = int(np.argmax(gaps))
+    by_clock = gaps & cut[1:]
+    if by_clock.any():
+        notes[told_back] += f", {silence[by_clock].sum():,.0f} s, in which nothing counts as covered"
+    other = gaps & ~cut[1:]
+    if other.any():
+        first = int(np.argmax(other))
         notes.append(
-            f"{who}: gaps: {np.count_nonzero(gaps)}, of {silence[gaps].sum():,.0f} s in all, the longest "
-            f"{silence.max():,.0f} s, the first {time[first] - time[0]:,.0f} s into it; nothing counts as covered in them"
+            f"{who}: gaps: {np.count_nonzero(other)}, of {silence[other].sum():,.0f} s in all, the longest "
+            f"{silence[other].max():,.0f} s, the first {time[first] - time[0]:,.0f} s into it; nothing counts as covered "
+            "in them"
         )
     values = {n: getattr(log, n)[kept] for n in ("heading", "speed", "energy")}
     height = log.height[kept] if vehicle.domain == "aerial" else np.zeros(len(kept))

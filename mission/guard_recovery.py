@@ -19,6 +19,7 @@ from quarterdeck.mission.guard_routes import Team, Tours, guard_route, shorter_t
 from quarterdeck.mission.guards import enter, guard_ranks, guards_mission, vehicle_ranges
 from quarterdeck.mission.mission import Guard, Mission
 from quarterdeck.mission.reason import Reason
+from quarterdeck.mission.task_recovery import homeward
 from quarterdeck.mission.timing import shortfalls
 
 EFFORT = 0.1  # of the search for a whole plan: robots are waiting
@@ -34,7 +35,10 @@ def guards_from_now(
     have joined. `served` are the stops (`guard-0`, ...) whose observation is confirmed. Guards of lost vehicles go to
     supportive ones (`coverage.recovery.recover`), then all orders are searched anew. Where the site has changed, guards
     are added. What cannot be seen any more, for want of a way or of energy, is told as an area, and makes it infeasible.
+    Where all that was to be seen is withdrawn, everybody goes home.
     """
+    if not scenario.site.coverable.area:
+        return _withdrawn(mission, scenario, served)
     ranges = vehicle_ranges(scenario.vehicles, mission.parameters.get("range"))
     whole, team, lonely = enter(space_of(scenario), scenario.vehicles, ranges, under_way=True)
     if mission.parameters.get("inspect") == "border":
@@ -61,8 +65,30 @@ def guards_from_now(
         after,
         parameters=mission.parameters,
         seed=seed,
+        figures={**after.figures, "undone_m2": lost},
         guards=(*after.guards, *(replace(g, vehicle=None, turn=None, seen=True) for g in seen.values())),
         reasons=(*([Reason(told)] if lost > 0 else []), *after.reasons),
+    )
+
+
+def _withdrawn(mission: Mission, scenario: Scenario, served: frozenset[str]) -> Mission:
+    routes, missing = homeward(scenario)
+    done = [g for g in with_confirmed(mission, served).guards if g.seen]
+    return replace(
+        mission,
+        site=scenario.site,
+        vehicles=scenario.vehicles,
+        routes=routes,
+        guards=tuple(replace(g, vehicle=None, turn=None) for g in done),
+        figures={
+            "guards": 0,
+            "makespan": max(r.duration for r in routes),
+            "energy": sum(r.energy for r in routes),
+            "undone_m2": 0.0,
+        },
+        bounds={},
+        reasons=tuple(missing),
+        layers=(),
     )
 
 

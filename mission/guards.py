@@ -17,6 +17,7 @@ from quarterdeck.geo.deadline import time_is_up
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Scenario, Vehicle, as_multipolygon
 from quarterdeck.geo.triangulation import Triangulation, triangulate
+from quarterdeck.geo.version import VERSION
 from quarterdeck.geo.visibility import visibility_polygons
 from quarterdeck.mission.guard_routes import Team, Tours, guard_layers, guard_route, guards_of, paper_tours, shorter_tours
 from quarterdeck.mission.mission import Mission, undone_layer
@@ -93,6 +94,7 @@ def guards_mission(
         "ratio": tours.makespan / tours.bound if tours.bound > 0 else 1.0,
         "duration": max(r.duration for r in routes),
         "length": sum(r.length for r in routes),
+        "energy": sum(r.energy for r in routes),
         "area": space.target.area,
         "certificate": {"uncovered": float(rest.area), "tolerance": TOLERANCE, "method": METHOD},
     }
@@ -111,6 +113,7 @@ def guards_mission(
         guards=guards_of(tours, team),
         layers=(*guard_layers(tours, team), *((undone_layer([(rest, "unseen")]),) if rest.area > 0 else ())),
         input_hash=scenario.input_hash,
+        version=VERSION,
     )
 
 

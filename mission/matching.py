@@ -52,6 +52,13 @@ def follow(mission: Mission, track: Track) -> Followed:
     return Followed(leg, away > 2 * near, elsewhere)
 
 
+def along_lines(mission: Mission, vehicle: Vehicle, track: Track) -> np.ndarray:
+    """Return (n,) bool: whether a vehicle that has no route went along a survey line of anybody's."""
+    lines = [line for r in mission.routes for line in unbroken(r.xyz[:, :2], r.survey)]
+    everywhere = np.arange(len(track.time))
+    return _along_any(track, everywhere, lines, tolerance(mission, vehicle)) if lines else np.zeros(len(everywhere), bool)
+
+
 def off_legs(route: Route, leg: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return metres along the legs (n,), the legs' lengths (n,), and the (n, d) offsets of (n, d) places from them.
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import inf
 
 import numpy as np
 from shapely import LineString
@@ -40,13 +41,7 @@ def planned_progress(mission: Mission, time: float, *, stopped: Mapping[str, flo
     """
     if not time >= 0:
         raise InputError(f"time {time:g} s must not be negative")
-    ends = {v.id: time for v in mission.vehicles}
-    for name, end in (stopped or {}).items():
-        if name not in ends:
-            raise InputError(f"unknown vehicle {name!r}; the plan has {', '.join(ends)}")
-        if not end >= 0:
-            raise InputError(f"vehicle {name!r}: lost since {end:g} s; seconds since the mission's start are not negative")
-        ends[name] = min(time, end)
+    ends = ends_at(mission, time, stopped or {})
     positions, energy = {}, {}
     tracks: list[np.ndarray] = []
     served: set[str] = set()
@@ -58,6 +53,25 @@ def planned_progress(mission: Mission, time: float, *, stopped: Mapping[str, flo
         tracks += surveyed(route, *at)
         served |= {w.task for w in route.waypoints if w.task and w.time + w.hold <= ends[vehicle.id]}
     return Progress(time, positions, energy, tuple(tracks), frozenset(served))
+
+
+def ends_at(mission: Mission, time: float, stopped: Mapping[str, float]) -> dict[str, float]:
+    """Return the seconds up to which each vehicle counts at `time`; those in `stopped` did nothing since (infinity: now).
+
+    Raises InputError if one in `stopped` is unknown, or stopped before the mission or later than `time`.
+    """
+    ends = {v.id: time for v in mission.vehicles}
+    for name, end in stopped.items():
+        if name not in ends:
+            raise InputError(f"unknown vehicle {name!r}; the plan has {', '.join(ends)}")
+        if not end >= 0:
+            raise InputError(f"vehicle {name!r}: lost since {end:g} s; seconds since the mission's start are not negative")
+        if time < end < inf:
+            raise InputError(
+                f"vehicle {name!r}: lost since {end:g} s, but it is {time:g} s now; leave that second out, or wait"
+            )
+        ends[name] = min(time, end)
+    return ends
 
 
 def _place(route: Route, time: float) -> tuple[int, tuple[float, float, float]]:

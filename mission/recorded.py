@@ -12,9 +12,9 @@ from quarterdeck.coverage.metrics import track_length
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.files import read_bytes
 from quarterdeck.geo.kinds import REPORT, kind_of
-from quarterdeck.mission.matching import Followed, follow, planned_time
+from quarterdeck.mission.matching import Followed, along_lines, follow, planned_time
 from quarterdeck.mission.mission import Mission, Route, unbroken
-from quarterdeck.mission.progress import Progress, planned_progress
+from quarterdeck.mission.progress import Progress, ends_at, planned_progress
 from quarterdeck.mission.remaining import remaining_parts
 from quarterdeck.mission.served import served_tasks
 from quarterdeck.mission.survey_recovery import VISITED
@@ -26,14 +26,20 @@ SILENT = 60.0  # s: who has not been heard of for longer is told
 
 
 def recorded_progress(
-    mission: Mission, tracks: Sequence[Track], time: float, *, stopped: Mapping[str, float] | None = None
+    mission: Mission,
+    tracks: Sequence[Track],
+    time: float,
+    *,
+    stopped: Mapping[str, float] | None = None,
+    lost: Sequence[Track] = (),
 ) -> tuple[Progress, list[str]]:
     """Return the progress at `time` by the tracks of a mission, and what was taken for granted.
 
-    Of vehicles in `stopped` nothing counts from then on; those without a track have done nothing, and must be lost.
-    Raises InputError if a vehicle that is not in `stopped` has no track up to then.
+    Of vehicles in `stopped` nothing counts from then on; those without a track have done nothing, and must be lost. `lost`
+    are tracks of vehicles that the plan gave up: what they surveyed counts, and they may come back from where they are.
+    Raises InputError if a vehicle that is not in `stopped` has no track up to then, or one in it stopped later.
     """
-    ends = {v.id: min(time, (stopped or {}).get(v.id, time)) for v in mission.vehicles}
+    ends = ends_at(mission, time, stopped or {})
     routes = {r.vehicle: r for r in mission.routes}
     known = [_until(t, ends[t.vehicle]) for t in tracks if t.time[0] <= ends[t.vehicle]]
     for vehicle in mission.vehicles:
@@ -55,6 +61,12 @@ def recorded_progress(
         energy[vehicle.id] = float(energy_used(vehicle, track)[-1])
         if mission.spacing is not None:
             lines += surveyed_lines(route, track, on, FINE * mission.spacing)
+    for track in (_until(t, time) for t in lost if t.time[0] <= time):
+        vehicle = next(v for v in mission.lost if v.id == track.vehicle)
+        positions[vehicle.id] = (float(track.x[-1]), float(track.y[-1]), float(np.nan_to_num(track.z[-1])))
+        energy[vehicle.id] = float(energy_used(vehicle, track)[-1])
+        if mission.spacing is not None:
+            lines += _thinned(track, along_lines(mission, vehicle, track), FINE * mission.spacing)
     served = frozenset(served_tasks(mission, known))
     return Progress(time, positions, energy, tuple(lines), served, along), notes
 
@@ -77,8 +89,11 @@ def _until(track: Track, time: float) -> Track:
 
 def surveyed_lines(route: Route, track: Track, on: Followed, tolerance: float) -> list[np.ndarray]:
     """Return the (n, 2) lines in metres along which a vehicle surveyed, thinned by no more than `tolerance`."""
-    survey = ((route.survey[on.leg] & ~on.strayed) | on.elsewhere) & ~track.broken
-    lines = unbroken(track.xy, survey)
+    return _thinned(track, (route.survey[on.leg] & ~on.strayed) | on.elsewhere, tolerance)
+
+
+def _thinned(track: Track, survey: np.ndarray, tolerance: float) -> list[np.ndarray]:
+    lines = unbroken(track.xy, survey & ~track.broken)
     return [shapely.get_coordinates(shapely.simplify(shapely.LineString(line), tolerance)) for line in lines]
 
 

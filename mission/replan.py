@@ -1,11 +1,13 @@
 """When things change: the mission from now on, from what really happened. One door for every method."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
-from shapely import Point
+from shapely import LineString, Point
 from shapely.ops import nearest_points
 
+from quarterdeck.coverage.metrics import covered_fraction, track_length
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Scenario, Site, Task, Vehicle
 from quarterdeck.mission.changes import Changes as Changes
@@ -15,6 +17,7 @@ from quarterdeck.mission.mission import Mission, Route, Waypoint
 from quarterdeck.mission.progress import Progress, budget_left, with_surveyed
 from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.recorded import as_planned
+from quarterdeck.mission.routes import survey_lines
 from quarterdeck.mission.survey_recovery import survey_from_now
 from quarterdeck.mission.task_recovery import assign_from_now, tasks_left
 from quarterdeck.mission.timing import shortfalls, timed_route
@@ -77,7 +80,15 @@ def _survivors(mission: Mission, progress: Progress, changes: Changes) -> tuple[
     staying = [_moved(v, progress) for v in mission.vehicles if v.id not in changes.lost]
     heard = [_moved(v, progress) for v in mission.lost if v.id in changes.back]
     back = [replace(v, start=changes.back[v.id] or v.start) for v in heard]
-    vehicles = [replace(v, speed=changes.speeds.get(v.id, v.speed)) for v in (*staying, *back, *changes.joined)]
+    vehicles = [
+        replace(
+            v,
+            speed=changes.speeds.get(v.id, v.speed),
+            battery=changes.batteries.get(v.id, v.battery),
+            endurance=changes.endurances.get(v.id, v.endurance),
+        )
+        for v in (*staying, *back, *changes.joined)
+    ]
     if not vehicles:
         raise InputError("every vehicle is lost and none joins or comes back; nobody is left to replan for")
     given = [v.share for v in vehicles]
@@ -137,18 +148,38 @@ def _rest(mission: Mission, progress: Progress) -> Mission:
     vehicles, lost = (tuple(_moved(v, progress) for v in some) for some in (mission.vehicles, mission.lost))
     reasons = [reason for v, r in zip(vehicles, routes, strict=True) for reason in shortfalls(v, r)]
     told = dict(mission.parameters) | {"replanned_at": progress.time, "lost": []}
-    left = {"makespan": max(r.duration for r in routes), "energy": sum(r.energy for r in routes)}
+    surveyed = () if mission.spacing is None else with_surveyed(mission, progress.tracks)
     return replace(
         mission,
         routes=routes,
         vehicles=vehicles,
         lost=lost,
         parameters=told,
-        surveyed=() if mission.spacing is None else with_surveyed(mission, progress.tracks),
+        surveyed=surveyed,
         tasks=tasks_left(mission, mission.tasks, progress, {v.id for v in vehicles}) if mission.tasks else (),
-        figures=dict(mission.figures) | left,
+        figures=_figures_left(mission, routes, surveyed),
+        bounds={},
         reasons=(*(r for r in mission.reasons if r.kind != "energy"), *reasons),
     )
+
+
+def _figures_left(mission: Mission, routes: tuple[Route, ...], surveyed: tuple[LineString, ...]) -> dict[str, Any]:
+    """Return the figures of what is left of a plan, those that a new plan by its method has; what is told stays told."""
+    figures = {"makespan": max(r.duration for r in routes), "energy": sum(r.energy for r in routes)}
+    figures |= {name: mission.figures[name] for name in ("undone", "undone_m2", "notes") if name in mission.figures}
+    if mission.method == "guards":
+        stops = [w for r in routes for w in r.waypoints if w.task is not None]
+        last = max((w.time for w in stops), default=0.0)
+        kept = {name: mission.figures[name] for name in ("area", "certificate") if name in mission.figures}
+        length = sum(r.length for r in routes)
+        figures["undone_m2"] = mission.figures["certificate"]["uncovered"]
+        return kept | figures | {"guards": len(stops), "makespan": last, "duration": figures["makespan"], "length": length}
+    if mission.spacing is not None:
+        ahead = survey_lines(routes)
+        done = [np.array(line.coords) for line in surveyed]
+        covered = covered_fraction([*done, *ahead], mission.site.coverable, mission.spacing)
+        return {"poc": covered, "length": sum(map(track_length, ahead)), "undone_m2": 0.0} | figures
+    return figures
 
 
 def _route_left(route: Route, progress: Progress, vehicle: Vehicle) -> Route:

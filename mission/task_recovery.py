@@ -67,7 +67,7 @@ def assign_from_now(mission: Mission, scenario: Scenario, progress: Progress, *,
             figures={**after.figures, "undone": undone},
             reasons=(*reasons, *after.reasons),
         )
-    routes, missing = _homeward(scenario)
+    routes, missing = homeward(scenario)
     return replace(
         mission,
         site=scenario.site,
@@ -85,7 +85,7 @@ def assign_from_now(mission: Mission, scenario: Scenario, progress: Progress, *,
     )
 
 
-def _homeward(scenario: Scenario) -> tuple[tuple[Route, ...], list[Reason]]:
+def homeward(scenario: Scenario) -> tuple[tuple[Route, ...], list[Reason]]:
     """Return the vehicles' ways home, as plans of tasks go, and why some cannot go it or stay where they are."""
     ways = travel(replace(scenario, tasks=()), quick=True)
     shut = ~np.isfinite(ways.idle)

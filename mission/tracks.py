@@ -22,14 +22,16 @@ PLACES, LITTLE = 500, 0.2  # of a track looked at; a part that is too little
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """The tracks of a plan's vehicles, in its order; `notes` is what was left out or taken for granted, `reasons` why the
-    logs are not of this plan, one line each. `start` is the mission's start in Unix seconds, where known.
+    """The tracks of a plan's vehicles, in its order, and of those that it gave up (`lost`); `notes` is what was left out or
+    taken for granted, `reasons` why the logs are not of this plan, one line each. `start` is the mission's start in Unix
+    seconds, where known.
     """
 
     tracks: tuple[Track, ...]
     notes: tuple[str, ...]
     reasons: tuple[Reason, ...]
     start: float | None = None
+    lost: tuple[Track, ...] = ()
 
 
 def read_tracks(mission: Mission, files: Sequence[str], *, start: float | None = None) -> Record:
@@ -62,7 +64,7 @@ def track_file(ids: Sequence[str], given: str) -> tuple[str, str, str]:
 
 def _assigned(mission: Mission, given: str) -> list[tuple[str, Log]]:
     """Return (vehicle, log) of the vehicles of one file."""
-    ids = [v.id for v in mission.vehicles]
+    ids = [v.id for v in (*mission.vehicles, *mission.lost)]
     vehicle, path, name = track_file(ids, given)
     logs = read_logs(path)
     inside = [log.vehicle for log in logs]
@@ -128,7 +130,20 @@ def record(mission: Mission, files: Sequence[Sequence[tuple[str, Log]]], *, star
             notes.append(f"{vehicle_id}: sets off {late:,.0f} s later than planned, counted from the mission's start")
         tracks.append(until_home(mission.vehicle(vehicle_id), routes[vehicle_id], moved))
     reasons += map(Reason, _on_other_routes(mission, tracks))
-    return Record(tuple(tracks), tuple(notes), tuple(reasons), start)
+    lost = []
+    for vehicle in mission.lost:  # it has no route: its clock is the others', or the mission's
+        if vehicle.id in logs:
+            whole = _joined(vehicle.id, logs[vehicle.id])
+            track, told, wrong = cleaned(mission, vehicle, whole)
+            notes += [*told, *wrong]
+            began_at = {"mission": 0.0, "unix": start}.get(whole.clock)
+            heard = None if track is None or began_at is None else since(track, began_at)
+            if heard is None or len(heard.time) < 2:
+                notes.append(f"{vehicle.id}: given up by this plan; by its log it is not known where it is now")
+            else:
+                lost.append(heard)
+                notes.append(f"{vehicle.id}: given up by this plan; where it is and what it surveyed is taken from its log")
+    return Record(tuple(tracks), tuple(notes), tuple(reasons), start, tuple(lost))
 
 
 def _began(vehicle: Vehicle, route: Route, log: Log, track: Track) -> float:

@@ -128,7 +128,7 @@ def _progress(
         if wrong:
             raise InputError(str(wrong[0]))
         now = max(float(t.time[-1]) for t in record.tracks) if time is None else time
-        progress, notes = recorded_progress(mission, record.tracks, now, stopped=stopped)
+        progress, notes = recorded_progress(mission, record.tracks, now, stopped=stopped, lost=record.lost)
         for note in (*record.notes, *notes):
             print_reason(console(), "note", note)
         return progress

@@ -83,7 +83,7 @@ def execute(
     record = read_tracks(mission, tracks, start=read_time(start) if start else None)
     began = None if record.start is None else datetime.fromtimestamp(record.start, UTC).isoformat()
     run = report_tracks(mission, record, limits=dict(limits), settings={"tracks": list(tracks), "start": began})
-    logs = dict.fromkeys(track_file([v.id for v in mission.vehicles], given)[1] for given in tracks)
+    logs = dict.fromkeys(track_file([v.id for v in (*mission.vehicles, *mission.lost)], given)[1] for given in tracks)
     data = {"plan": document.data} | {path: read_bytes(path) for path in logs}
     files = {name: sha256(content).hexdigest() for name, content in data.items()}
     report = with_state(mission, run.report, record.tracks)
