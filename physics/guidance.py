@@ -196,7 +196,7 @@ def guide_multirotors(
             if t.reach >= length:
                 if _stops(t, table, time):
                     t.reach, t.pace = length, 0.0
-                    if gap < 0.5:
+                    if gap < 0.5 and abs(t.aside) < 0.2 * lim.length:  # back on its path
                         _arrive(t, table, time)
                 else:
                     t.reach -= length
@@ -204,13 +204,17 @@ def guide_multirotors(
                     a, b = table[t.leg - 1], table[t.leg]
                     dx, dy, dz = b.x - a.x, b.y - a.y, b.z - a.z
                     length = np.sqrt(dx * dx + dy * dy + dz * dz)
+                    if t.aside != 0.0 and np.hypot(dx, dy) > 0.1:  # it stays where it is, to starboard of another leg
+                        turn = np.arctan2(dy, dx) - reference[i, 6]
+                        t.reach -= t.aside * np.sin(turn)
+                        t.aside *= np.cos(turn)
         if t.mode == SAIL and length > 0:
             s, v = min(t.reach, length) / length, t.pace / length
             reference[i, 0], reference[i, 1], reference[i, 2] = a.x + s * dx, a.y + s * dy, a.z + s * dz
             reference[i, 3], reference[i, 4], reference[i, 5] = v * dx, v * dy, v * dz
             if np.hypot(dx, dy) > 0.1:
                 reference[i, 6] = np.arctan2(dy, dx)
-            _step_aside(t, min(lim.speed, max(t.slow, 0.0)), step)  # here the shift is the motion
+            _step_aside(t, min(b.speed, max(t.slow, 0.0)), step)  # here the shift is the motion
             reference[i, 0] += t.aside * np.sin(reference[i, 6])
             reference[i, 1] -= t.aside * np.cos(reference[i, 6])
             px, py, pz = position[i, 0] - a.x, position[i, 1] - a.y, position[i, 2] - a.z

@@ -77,5 +77,5 @@ def command_track(
     track["mode"], track["until"] = (HOLD, waypoints[0].time) if waypoints else (IDLE, 0.0)
     if waypoints:  # waits where it is until it may depart
         track["leg"] -= 1
-    track["integral"] = track["reach"] = track["pace"] = 0.0
+    track["integral"] = track["reach"] = track["pace"] = track["aside"] = track["want"] = 0.0
     return np.concatenate([table, rows])

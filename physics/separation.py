@@ -69,7 +69,9 @@ def give_way(
                 passing = -berth if aside[i] != 0.0 else 0.0  # aside until it is past
                 ahead = berth + max(speed[i], 0.25 * pace[i]) * HORIZON
                 room = WIDE * apart if np.any(leg[j] != 0.0) else berth
-                if passing < along < ahead and abs(aft) < room and off < room * room:
+                # In its way, or in that back to its leg.
+                between = min(aside[i], 0.0) - room < aft < max(aside[i], 0.0) + room
+                if passing < along < ahead and between and off < room * room:
                     one, other = max(aft + PASS * berth, 0.0), min(aft - PASS * berth, 0.0)
                     starboard = aside[i] > 0.0 if aside[i] != 0.0 else one < -other  # and it keeps to that side
                     want[i], instead[i] = (one, other) if starboard else (other, one)

@@ -65,7 +65,7 @@ class Watch:
         speed = np.linalg.norm(velocity, axis=1)
         pace = np.where(fleet.gather("idle"), 0.0, fleet.gather("pace"))
         going = present & (fleet.gather("tracks")["mode"] != HOLD) & (pace > 0.0)
-        order, stood = self._stand(time, position, going)
+        order, stood = self._stand(time, position, going, fleet.gather("tracks")["want"] != 0.0)
         place = np.empty(count, int)
         place[order] = np.arange(count)
         stands = stood > WAITS
@@ -97,13 +97,16 @@ class Watch:
         for squad in fleet.squads:
             squad.tracks["slow"], squad.tracks["want"] = slow[squad.index], want[squad.index]
 
-    def _stand(self, time: float, position: np.ndarray, going: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _stand(
+        self, time: float, position: np.ndarray, going: np.ndarray, passing: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return the order in which vehicles go, (k,), who stood for longest first, and for how long each has, (k,) s.
 
-        One stands that is `going` (k,) somewhere and has not come the distance kept further. Those who stand take
-        turns: the first may have no room.
+        One stands that is `going` (k,) somewhere and has not come the distance kept further, nor is done with
+        `passing` (k,) the one it stood for. Those who stand take turns: the first may have no room.
         """
-        moved = ~going | (np.linalg.norm(position - self.anchor, axis=1) > self.keep)
+        around = passing & (time - self.since > WAITS)
+        moved = ~going | ~around & (np.linalg.norm(position - self.anchor, axis=1) > self.keep)
         self.anchor[moved], self.since[moved] = position[moved], time
         stood = time - self.since
         order = np.argsort(np.where(stood > WAITS, self.since, np.inf), kind="stable")
