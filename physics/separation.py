@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 
 HORIZON = 20.0  # s
+MEET = 0.6  # of the distance kept: how far each of two goes aside that meet head-on
 PASS = 1.25  # berths off one passes it
 BERTH = 0.45  # of the distance kept: how near one may pass what lies still; less than routes keep from wrecks
 WIDE = 0.8  # of the distance kept: how near one may pass what stands and wants to go on
@@ -106,7 +107,7 @@ def give_way(
                 continue
             meeting = abs(_wrap(np.arctan2(course[j, 1], course[j, 0]) - angle))
             if meeting > 2.62 and abs(bearing) < 1.6:  # head-on: both to starboard
-                want[i] = apart
+                want[i] = MEET * apart
             elif meeting < 1.17:  # overtaking, or side by side
                 if abs(bearing) < 0.8 or (i > j and abs(bearing) < 1.96):
                     slow[i] = min(slow[i], 0.7 * speed[j])
