@@ -14,7 +14,7 @@ from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.files import read_bytes
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.importers import as_geojson
-from quarterdeck.geo.kinds import kind_of
+from quarterdeck.geo.kinds import COLLECTIONS, kind_of
 from quarterdeck.geo.scenario import as_multipolygon
 
 STDIN = "standard input"
@@ -48,7 +48,7 @@ def opened(source: str | Path | Document) -> Document:
         return Document(name, data, parse(data))
     except InputError as error:
         kind = kind_of(data)
-        raise InputError(f"{name}: is {kind}" if kind else f"{name}: {error}") from None
+        raise InputError(f"{name}: {error}" if kind in (None, *COLLECTIONS) else f"{name}: is {kind}") from None
 
 
 def parse(data: bytes) -> dict[str, Any]:

@@ -15,6 +15,7 @@ PLAN = "a PLAN; `check`, `simulate`, `export`, `replan`, `report` and `replay --
 FATES = "what became of casualties, made by `triage`; no verb takes it"
 CHANGES = "a file of changes; `replan --changes` takes it"
 SITE = "a site; `check`, `plan`, `assign` and `triage` take it"
+COLLECTIONS = (PLAN, FATES, CHANGES, SITE)
 SITE_ROLES = {"area", "task", "casualty"}
 REPORT = "a report; `replay` and `replan --state` take it"
 STUDY = "a study; `campaign` takes it"

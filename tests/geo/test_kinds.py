@@ -8,6 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.geojson import opened
 from quarterdeck.geo.kinds import CELL, CHANGES, FATES, MODEL, PLAN, REPORT, SITE, STUDY, TRACE, kind_of
 
 
@@ -47,6 +49,14 @@ def test_a_trace_is_no_other_archive() -> None:
     np.savez(file, time=np.zeros(3))
     assert kind_of(file.getvalue()) == TRACE
     assert kind_of(b"PK\x03\x04doc.kml") is None
+
+
+def test_a_damaged_collection_is_told_what_is_wrong_with_it(tmp_path) -> None:
+    """That it is a site helps nobody who gave a site."""
+    path = tmp_path / "site.geojson"
+    path.write_bytes(collection({"role": "area", "spacing": float("nan")}))
+    with pytest.raises(InputError, match="NaN is no number"):
+        opened(path)
 
 
 @given(st.binary() | st.text().map(str.encode))
