@@ -30,7 +30,7 @@ from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.routes import survey_lines, survey_routes
 from quarterdeck.mission.timing import seconds_out
 
-MAX_HYPERVERTICES = 1_000_000  # of which 77,000 take 0.2 GB beside what Python takes, and 38 s
+MAX_HYPERVERTICES = 800_000  # of which 390,000 take 1.0 GB in all (benchmarks/limits.py): so that 2 GB are enough
 ROUNDS = 2  # of dividing again, once ways and turns are known
 
 

@@ -53,7 +53,8 @@ def mend(space: Space, mesh: Triangulation, guards: np.ndarray, reach: float) ->
                     break
                 continue
         west, south, east, north = piece.bounds
-        if max(east - west, north - south) ** 2 > smallest:
+        finest = reach / 64 if shapely.area(hopeless).sum() <= TOLERANCE * space.target.area else reach / 8  # no proof then
+        if max(east - west, north - south) > finest:
             rest += _quarters(piece)
         else:
             hopeless.append(piece)

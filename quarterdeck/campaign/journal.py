@@ -3,6 +3,7 @@
 import fcntl
 import json
 import os
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Self
@@ -41,7 +42,11 @@ class Journal:
         if found != header:
             self.file.truncate(0)
             self.rows = {}
-            self._append(header)
+            try:
+                self._append(header)
+            except InputError:
+                self.__exit__(None, None, None)
+                raise
 
     def __enter__(self) -> Self:
         """Return itself."""
@@ -49,10 +54,11 @@ class Journal:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         """Close and unlock."""
-        self.file.close()
+        with suppress(OSError):  # what could not be written was told by `add`
+            self.file.close()
 
     def add(self, row: dict[str, Any]) -> None:
-        """Keep the row of a run that is done; it is on the disk when this returns."""
+        """Keep the row of a run that is done; it is on the disk when this returns. Raises InputError if it cannot be."""
         if row["number"] not in self.rows:
             self.rows[row["number"]] = row
             self._append(row)
@@ -71,7 +77,12 @@ class Journal:
             return {}, {}
 
     def _append(self, document: dict[str, Any]) -> None:
-        self.file.seek(0, os.SEEK_END)
-        self.file.write(json.dumps(document, separators=(",", ":")).encode() + b"\n")
-        self.file.flush()
-        os.fsync(self.file.fileno())
+        try:
+            self.file.seek(0, os.SEEK_END)
+            self.file.write(json.dumps(document, separators=(",", ":")).encode() + b"\n")
+            self.file.flush()
+            os.fsync(self.file.fileno())
+        except OSError as error:
+            raise InputError(
+                f"{self.file.name} cannot be written ({error.strerror}); give the same command once it can: no run is lost"
+            ) from None

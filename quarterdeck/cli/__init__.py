@@ -1,9 +1,12 @@
 """The command line: one file a verb, imported only when it is called."""
 
 import os
+import signal
 import sys
+import threading
 from difflib import get_close_matches
 from importlib import import_module
+from pathlib import Path
 
 import click
 from click.shell_completion import CompletionItem
@@ -101,7 +104,12 @@ def group() -> None:
 
 
 def main(args: list[str] | None = None) -> None:
-    """Run the command line: our own errors are one line on stderr and exit status 2."""
+    """Run the command line: our own errors are one line on stderr and exit status 2; a SIGTERM is as a Ctrl-C."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:  # closed by whoever called us
+            setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115 - for good
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # else what is being written would be left behind
     try:
         status = group.main(args=args, prog_name="quarterdeck", standalone_mode=False)
     except QuarterdeckError as error:
@@ -116,6 +124,9 @@ def main(args: list[str] | None = None) -> None:
     except BrokenPipeError:  # the reader of our standard output has gone: nothing is wrong
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
+    except OSError as error:  # standard output: files say theirs themselves
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _stop(f"quarterdeck: standard output cannot be written ({error.strerror or error}); give a file with -o", 2)
     sys.exit(status if isinstance(status, int) else 0)
 
 

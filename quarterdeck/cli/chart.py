@@ -5,6 +5,7 @@ import click
 from quarterdeck.cli.files import takes
 from quarterdeck.cli.output import emit, force_option, output_option
 from quarterdeck.cli.parameters import Numbers, Real
+from quarterdeck.geo.errors import one_line
 
 
 @click.command(short_help="ENC cells as a site.")
@@ -54,4 +55,4 @@ def command(
     )
     emit(site_text(replace(scenario, spacing=spacing)), output, force=force)
     for note in (*notes, "not for navigation"):
-        click.echo(note, err=True)
+        click.echo(one_line(note), err=True)

@@ -8,6 +8,7 @@ import click
 from quarterdeck.cli.files import takes
 from quarterdeck.cli.output import force_option, terrain_option, tolerance_option
 from quarterdeck.cli.parameters import Choice, Moment, Real
+from quarterdeck.geo.errors import one_line
 
 
 def _formats(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[str]:  # noqa: ARG001 - click calls it
@@ -79,4 +80,4 @@ def command(
 
 
 def _note(line: str) -> None:
-    click.echo(f"note: {line}", err=True)
+    click.echo(one_line(f"note: {line}"), err=True)

@@ -1,11 +1,13 @@
 """Where results and tables go: results to a file or standard output, tables and progress to standard error."""
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import click
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
@@ -79,9 +81,19 @@ def tell_compiling() -> None:
     click.get_current_context().call_on_close(close)
 
 
+class Screen(Console):
+    """A console to which names from files are text alone: what steers a terminal, or turns its writing, shows as U+FFFD."""
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Yield the segments of what is to be printed."""
+        for segment in super().render(renderable, options):
+            plain = "".join(c if c.isprintable() or c == "\n" else "\ufffd" for c in segment.text)
+            yield segment if segment.control or plain == segment.text else Segment(plain, segment.style)
+
+
 def console() -> Console:
     """Return the console on standard error; brackets and colons in names and reasons are just that, no markup."""
-    return Console(stderr=True, highlight=False, markup=False, emoji=False)
+    return Screen(stderr=True, highlight=False, markup=False, emoji=False)
 
 
 def print_reason(screen: Console, what: str, reason: Reason | str) -> None:

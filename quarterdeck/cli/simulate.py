@@ -22,7 +22,7 @@ from quarterdeck.cli.output import (
 )
 from quarterdeck.cli.parameters import Choice, Real
 from quarterdeck.cli.verdict import print_report
-from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.errors import InputError, one_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -282,6 +282,6 @@ def _progress(title: str) -> Iterator[Callable[[float, float], None]]:
 
 
 def _replanned(time: float, after: Mission) -> None:
-    click.echo(f"{minutes(time)}: replanned for {', '.join(v.id for v in after.vehicles)}", err=True)
+    click.echo(one_line(f"{minutes(time)}: replanned for {', '.join(v.id for v in after.vehicles)}"), err=True)
     for reason in after.reasons:
-        click.echo(f"  {reason}", err=True)
+        click.echo(f"  {one_line(str(reason))}", err=True)

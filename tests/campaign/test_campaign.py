@@ -1,5 +1,6 @@
 """Campaigns end to end: run, killed, gone on with, replayed, on a cluster."""
 
+import errno
 import json
 import os
 import shlex
@@ -126,6 +127,24 @@ def test_results_of_another_study_are_not_mixed(study: Writer, whole: Path, capf
     assert len(rows(whole)) == 24
     assert campaign(path, "-o", whole, "--jobs", 1, "--force") == 0
     assert len(rows(whole)) == 2
+
+
+def test_a_full_disk_ends_a_campaign_in_one_line(study: Writer, tmp_path: Path, monkeypatch, capfd) -> None:
+    """What was done before is kept, and done no more when there is room again."""
+    path, folder = study(STUDY.replace("runs = 12", "runs = 2")), tmp_path / "runs"
+    sync, calls = os.fsync, []
+
+    def full(number: int) -> None:
+        calls.append(number)
+        if len(calls) == 3:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        sync(number)
+
+    monkeypatch.setattr(os, "fsync", full)
+    assert campaign(path, "-o", folder, "--jobs", 1) == 2
+    assert "cannot be written (No space left on device)" in capfd.readouterr().err.strip().splitlines()[-1]
+    assert campaign(path, "-o", folder, "--jobs", 1) == 0
+    assert len(rows(folder)) == 4
 
 
 def test_a_run_that_goes_wrong_is_a_row(study: Writer, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -21,7 +21,7 @@ calls, own = [], {holder}.{name}
 def counted(*args, **options):
     calls.append(1)
     if len(calls) == {count}:
-        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), signal.{sent})
     return own(*args, **options)
 {holder}.{name} = counted
 from quarterdeck.cli import main
@@ -29,9 +29,9 @@ main(sys.argv[1:])
 """
 
 
-def interrupted(module, holder, name, count, *arguments):
-    """Run the command line in a process that gets a real SIGINT at the n-th call of a function; return how it ended."""
-    code = STOPPED.format(module=module, holder=holder, name=name, count=count)
+def interrupted(module, holder, name, count, *arguments, sent="SIGINT"):
+    """Run the command line in a process that gets a real signal at the n-th call of a function; return how it ended."""
+    code = STOPPED.format(module=module, holder=holder, name=name, count=count, sent=sent)
     command = [sys.executable, "-c", code, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
@@ -127,6 +127,32 @@ def test_an_interrupted_plan_leaves_nothing(tmp_path):
     assert done.returncode == 130
     assert done.stderr.strip() == "quarterdeck: interrupted"
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("sent", ["SIGINT", "SIGTERM", "SIGKILL"])
+def test_what_is_stopped_in_the_middle_of_writing(hall, tmp_path, sent):
+    """Of files that belong together none is changed; none is left beside them, but by what cannot be caught."""
+    assert status("export", hall, "--to", "qgc-wpl", "-o", tmp_path, "--unsafe") == 0
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    assert len(before) >= 3
+    arguments = ["export", hall, "--to", "qgc-wpl", "-o", tmp_path, "--unsafe", "--force"]
+    done = interrupted("quarterdeck.geo", "files", "_beside", 3, *arguments, sent=sent)
+    assert done.returncode == (-signal.SIGKILL if sent == "SIGKILL" else 130), done.stderr
+    assert {path: path.read_bytes() for path in before} == before
+    left = set(tmp_path.iterdir()) - set(before)
+    assert all(path.name.startswith(".") for path in left) if sent == "SIGKILL" else not left
+
+
+@pytest.mark.parametrize("stream", ["> /dev/full", "-o /dev/full", ">&-", "2>&-", "<&-"])
+def test_streams_that_are_full_or_closed(stream):
+    """One line and status 2 where a result cannot be written; whoever closes a stream does without it."""
+    site = DATA / "inspection_hall.geojson"
+    command = f"{sys.executable} -m quarterdeck assign {site} --iterations 1 {stream}"
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=False)
+    assert done.returncode == (2 if "full" in stream else 0), done.stderr
+    assert "Traceback" not in done.stderr
+    if "full" in stream:
+        assert "cannot be written (No space left on device)" in done.stderr.splitlines()[-1]
 
 
 def test_an_interrupted_campaign_goes_on_where_it_was(hall, tmp_path):

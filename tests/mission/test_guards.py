@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
+from quarterdeck.coverage.guards import certificate
 from quarterdeck.coverage.guards.certificate import uncovered_by_shadows
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.frame import Frame
@@ -55,6 +56,18 @@ def test_an_area_out_of_sight_is_refused_at_once() -> None:
     given = scenario((1, 1))
     with pytest.raises(InputError, match="no part of the area can be seen"):
         plan_guards(replace(given, site=replace(given.site, areas=(far,))), range=12.0)
+
+
+def test_the_rim_of_what_can_be_seen_is_not_searched_for_ever(monkeypatch) -> None:
+    """Where vehicles may not follow, most of an area is out of range: that is told, its rim is not cut ever finer."""
+    cut, quarters = [], certificate._quarters
+    monkeypatch.setattr(certificate, "_quarters", lambda piece: cut.append(piece) or quarters(piece))
+    wide = Area("wide", as_multipolygon(shapely.box(0, 0, 60, 120)))
+    given = scenario((1, 1))
+    mission = plan_guards(replace(given, site=replace(given.site, areas=(wide,))), range=12.0, mode="paper")
+    assert not mission.feasible
+    assert "cannot be seen from where the vehicles may be" in str(mission.reasons[0])
+    assert len(cut) < 1500
 
 
 def test_optimised_is_never_worse_and_the_same_seed_gives_the_same_plan() -> None:

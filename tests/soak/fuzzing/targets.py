@@ -82,7 +82,8 @@ def plan(rng: np.random.Generator, _: Files) -> Request:
     data = damaged(name, data, rng) if rng.random() < 0.8 else data
     method = _pick(rng, *METHODS).split()
     odd = _options(rng, "--spacing", "--angle", "--range", "--run", "--cross-every", "--entry", "--alternate", "--seed")
-    return _with_stdin(name, data, ["plan", "-o", "out/plan.geojson", "--method", *method, *odd], rng)
+    args = ["plan", "-o", "out/plan.geojson", "--time-limit", "20", "--method"]  # the largest that is taken is minutes
+    return _with_stdin(name, data, [*args, *method, *odd], rng)
 
 
 def assign(rng: np.random.Generator, _: Files) -> Request:
