@@ -208,9 +208,20 @@ def _take_over(desk: Desk, name: str, section: str) -> None:
     entry = me.board[section]
     desk.note(name, "takes over", section)
     board = {**me.board, section: Section(desk.time, entry.rest, entry.place, name)}
-    desk.change(name, section=section, rest=entry.rest, left=entry.place, searched=False, sweeps=0, board=board)
+    left = _past(desk, section, entry)
+    desk.change(name, section=section, rest=entry.rest, left=left, searched=False, sweeps=0, board=board)
     desk.fire(name, "section overdue")
     _back(desk, name)
+
+
+def _past(desk: Desk, section: str, entry: Section) -> XY:
+    """Return where to go on: as far past the place of the last word as one keeps off a body, for who is lost lies there."""
+    robot = desk.team.ugvs[section]
+    if not 0 <= entry.rest < len(robot.path):
+        return entry.place
+    (x, y), ahead = entry.place, robot.path[entry.rest]
+    part = min(1.0, robot.standoff / max(hypot(ahead.x - x, ahead.y - y), 1e-9))
+    return x + part * (ahead.x - x), y + part * (ahead.y - y)
 
 
 def _to_depot(desk: Desk, name: str) -> list[XY]:
