@@ -212,11 +212,12 @@ def _shared(
     best: _Survey | None = None
     for _ in range(1 + ROUNDS):
         team = team_of(vehicles, paces, spent, limits)
-        survey, lines = _affordable(vehicles, _by_priority(team, classes, crumb), roads, paces)
+        shares = _by_priority(team, classes, crumb)
+        survey, taken = _affordable(vehicles, shares, roads, paces)
         if best is not None and survey.merit >= best.merit:
             break
         best = survey
-        spent = spent + np.array([r.duration for r in survey.routes]) - times(team, lines)
+        spent = spent + taken - times(team, shares.lines)
     assert best is not None
     return best
 
@@ -272,18 +273,22 @@ def _by_priority(team: Team, classes: Sequence[tuple[list[list[Line]], list[Line
 
 def _affordable(
     vehicles: Sequence[Vehicle], shares: Shares, roads: Sequence[Roadmap], paces: np.ndarray
-) -> tuple[_Survey, list[list[Line]]]:
-    """Return the routes along lines, each cut at its end until its vehicle has the energy for it; and the lines."""
+) -> tuple[_Survey, np.ndarray]:
+    """Return the routes along lines, each cut at its end until its vehicle has the energy for it; and the (k,) seconds that
+    they would take uncut.
+    """
     lines, left = [list(own) for own in shares.lines], list(shares.left)
+    taken = np.zeros(len(vehicles))
     for attempt in range(CUTS):
         routes, reasons = line_routes(vehicles, [[x.points for x in own] for own in lines], roads)
+        taken = taken if attempt else np.array([r.duration for r in routes])
         poor = [i for i, (v, r) in enumerate(zip(vehicles, routes, strict=True)) if lines[i] and shortfalls(v, r)]
         if not poor:
             break
         for i in poor:
             metres = _excess(vehicles[i], routes[i]) / paces[i] if attempt < CUTS - 2 else np.inf
             left += _dropped(lines[i], metres)
-    return _Survey(routes, tuple(reasons), left), lines
+    return _Survey(routes, tuple(reasons), left), taken
 
 
 def _excess(vehicle: Vehicle, route: Route) -> float:
