@@ -98,16 +98,17 @@ def _undone(case: Any, run: Run, watched: Any, last: Mission) -> list[str]:
     """Return what was planned, not done and not told of by the last plan."""
     mission = case.mission
     if mission.method == "guards":
-        return _unseen(mission, run, last)
+        return _unseen(mission, run, last, _blind(case))
     if mission.method == "assign":
         return _unserved(case, run, watched, last)
     return _undriven(mission, run, last, 0.5 * float(mission.spacing or 0.0) + _blind(case))
 
 
-def _unseen(mission: Mission, run: Run, last: Mission) -> list[str]:
+def _unseen(mission: Mission, run: Run, last: Mission, off: float) -> list[str]:
+    """Return how much was not seen that was to be, but what is told and what is no wider than guards were `off`, metres."""
     told = shapely.union_all(last.layer("undone").geometries).buffer(0.01)
     before = unseen(mission, [shapely.LineString(r.xyz[:, :2]) for r in mission.routes if len(r.waypoints) > 1])
-    after = unseen(mission, whole_tracks(run.trace, 0.02)).difference(told)
+    after = unseen(mission, whole_tracks(run.trace, 0.02)).difference(told).buffer(-off)
     whole = mission.figures["area"]
     return [f"did not see {after.area / whole:.2%}"] if after.area - before.area > UNSEEN * whole else []
 
