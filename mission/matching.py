@@ -105,7 +105,7 @@ def _legs(vehicle: Vehicle, route: Route, track: Track, near: float) -> np.ndarr
     picked = places[kept]
     step = np.diff(picked, axis=0, append=picked[-1:])
     step /= np.maximum(np.linalg.norm(step, axis=1), 1e-9)[:, None]
-    found = _likeliest(picked, step, points, near, stride)
+    found = _likeliest(picked, step, np.ascontiguousarray(points), near, stride)
     latest = np.searchsorted(kept, np.arange(len(places)), side="right") - 1
     leg, coming = found[latest] + 1, found[np.minimum(latest + 1, len(kept) - 1)] + 1
     return np.where(_away(route, coming, places) < _away(route, leg, places), coming, leg)

@@ -85,7 +85,7 @@ def _by_class(distance: np.ndarray, ranks: np.ndarray, exact_to: int) -> tuple[n
     return order, total, bounds
 
 
-@numba.njit(cache=True)
+@numba.njit  # of several signatures: no cache of its own (see .ci/signatures)
 def _held_karp(distance: np.ndarray, start: int, members: np.ndarray) -> tuple[np.ndarray, float]:
     n = len(members)
     if n == 1:
@@ -120,7 +120,7 @@ def _held_karp(distance: np.ndarray, start: int, members: np.ndarray) -> tuple[n
     return path, length
 
 
-@numba.njit(cache=True)
+@numba.njit  # of several signatures: no cache of its own (see .ci/signatures)
 def _local_search(distance: np.ndarray, start: int, members: np.ndarray) -> tuple[np.ndarray, float]:
     n = len(members)
     path = np.empty(n + 1, np.int64)  # path[0] is the start and stays
@@ -192,7 +192,7 @@ def _improve(distance: np.ndarray, path: np.ndarray) -> None:
                     better = True
 
 
-@numba.njit(cache=True)
+@numba.njit  # of several signatures: no cache of its own (see .ci/signatures)
 def _lower_bound(distance: np.ndarray, start: int, members: np.ndarray, upper: float) -> float:
     """A path is a spanning tree of degree 1 at the start and the end, 2 within: price the degrees and ascend."""
     n = len(members) + 1

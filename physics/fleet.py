@@ -150,7 +150,7 @@ class Vessels(Squad):
     def guide(self, time: float, step: float) -> None:
         self.seen[:, 2:] = self.state[:, [vessel.U, vessel.V]]
         pose = self.state[:, :3] + self.error
-        rate = self.state[:, vessel.R]
+        rate = self.state[:, vessel.R].copy()
         guide_vessels(time, step, pose, self.seen, rate, self.limits, self.tracks, self.table, self.heading, self.speed)
 
     def drive(self, step: float, current: np.ndarray, wind: np.ndarray) -> None:

@@ -172,7 +172,7 @@ def _control(s: np.ndarray, p: Any, target: np.ndarray, dt: float, q: np.ndarray
         q[j] = min(max(q[j], 0.0), p.most)
 
 
-@njit(cache=True)
+@njit  # of several signatures: no cache of its own (see .ci/signatures)
 def _axis(s: np.ndarray, p: Any, target: np.ndarray, c: int, kp: float, kv: float, ki: float, dt: float) -> float:
     """Return the acceleration wanted along one axis, and carry its integral on."""
     error = target[c] - s[P + c]

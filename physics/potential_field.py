@@ -54,7 +54,7 @@ def field_velocity(
     """
     p = params
     return _velocities(
-        pose, goal, speed, angles, ranges, keep, others,
+        pose, goal, speed, angles, ranges, np.ascontiguousarray(keep), np.ascontiguousarray(others),
         p.attraction, p.obstacles, p.robots, p.influence, p.swirl, p.scaled,
     )  # fmt: skip
 
@@ -157,7 +157,7 @@ def _velocities(
     return out
 
 
-@njit(cache=True)
+@njit  # of several signatures: no cache of its own (see .ci/signatures)
 def _push(
     ux: float, uy: float, d: float, gx: float, gy: float, away: float, influence: float, swirl: float, scaled: bool
 ) -> tuple[float, float]:
@@ -185,7 +185,7 @@ def _push(
     return fx, fy
 
 
-@njit(cache=True)
+@njit  # of several signatures: no cache of its own (see .ci/signatures)
 def _barred(
     heading: float, angles: np.ndarray, ranges: np.ndarray, keep: np.ndarray, vx: float, vy: float
 ) -> tuple[float, float]:

@@ -188,7 +188,8 @@ def measure(
     allowed = check_limits(limits)
     size = np.array([np.hypot(v.model.length, v.model.width) for v in mission.vehicles])
     thin = max(1, round(0.5 / max(float(np.diff(trace.time[:2]).sum()), 1e-9))) if len(trace.time) > 1 else 1
-    near = closest_approaches(trace.x[::thin], trace.y[::thin], trace.z[::thin], trace.underway[::thin], size)
+    x, y, z, underway = (np.ascontiguousarray(a[::thin]) for a in (trace.x, trace.y, trace.z, trace.underway))
+    near = closest_approaches(x, y, z, underway, size)
     routes = {route.vehicle: route for route in mission.routes}
     vehicles = tuple(
         _vehicle(mission, trace, i, bool(finished[i]), bool(aground[i]), routes, near, thin)

@@ -138,7 +138,7 @@ def _segment(number: int, i: int) -> tuple[int, int, bool, int]:
     return first, first + size - 1, after, int(lead != after)
 
 
-@njit(cache=True)
+@njit  # of several signatures: no cache of its own (see .ci/signatures)
 def _piece(new: np.ndarray, q: int, row: int, first: int, last: int, back: int) -> None:
     new[q, 0] = row
     new[q, 1] = first

@@ -19,7 +19,7 @@ def _next(state: np.ndarray) -> np.uint64:
     return x * np.uint64(2685821657736338717)
 
 
-@njit(cache=True)
+@njit  # of several signatures: no cache of its own (see .ci/signatures)
 def below(state: np.ndarray, n: int) -> int:
     """Return a random integer in 0..n-1."""
     return np.int64(_next(state) >> np.uint64(33)) % n  # type: ignore[return-value]

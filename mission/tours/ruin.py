@@ -144,7 +144,7 @@ def _ruin(p: Problem, t: Tables, seq, length, absent, touched, rng) -> int:  # t
     return count
 
 
-@njit(cache=True)
+@njit  # of several signatures: no cache of its own (see .ci/signatures)
 def recreate(p: Problem, t: Tables, seq, length, absent, count, touched, smooth, rng, start, done) -> bool:  # type: ignore[no-untyped-def]
     """Put `count` absent tasks back, each where it costs least at that moment; False if one has no place."""
     shuffle(rng, absent[:count])

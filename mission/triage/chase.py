@@ -104,7 +104,7 @@ def _meeting(knots: np.ndarray, here: XY, speed: float, now: float, ways: Ways) 
     raise AssertionError("a course has at least one corner")
 
 
-@numba.njit(cache=True)
+@numba.njit  # of several signatures: no cache of its own (see .ci/signatures)
 def _meet(knots: np.ndarray, px: float, py: float, speed: float, now: float) -> tuple[float, float, int]:
     """Return the meeting's x, y and the index of the knot after it, for a pursuer at (px, py) who leaves at `now`."""
     n = len(knots)
