@@ -293,6 +293,12 @@ def changed_site(site: Site, changes: Changes) -> Site:
     return Site((*areas, *changes.areas), operating, (*kept, *_numbered(changes.obstacles, {o.id for o in kept})))
 
 
+def changed_tasks(tasks: Sequence[Task], changes: Changes) -> tuple[Task, ...]:
+    """Return the tasks that are asked for from now on, done or not."""
+    edited = {t.id: t for t in changes.edited}
+    return (*(edited.get(t.id, t) for t in tasks if t.id not in changes.withdrawn), *changes.tasks)
+
+
 def _numbered(obstacles: Sequence[Obstacle], taken: set[str]) -> list[Obstacle]:
     named = []
     for obstacle in obstacles:

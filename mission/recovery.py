@@ -6,7 +6,7 @@ tell it of a new plan. Silent for longer than the delay, it is given up, and sta
 When it is heard again, what it has done meanwhile counts, and it takes a part of what is left.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 from typing import Any
@@ -17,7 +17,7 @@ from shapely import MultiPolygon, Point
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Obstacle, Vehicle, as_multipolygon
-from quarterdeck.mission.changes import Changes
+from quarterdeck.mission.changes import Changes, changed_site, changed_tasks, check_changes
 from quarterdeck.mission.contact import Contact, within_range
 from quarterdeck.mission.director import Command, Director, Event, State
 from quarterdeck.mission.inspection import Memory as Inspected
@@ -47,7 +47,7 @@ class _Memory:
     that each was commanded last, `serving` the task that it is at by them, and since when. `wrecks` are the ids that those
     who were given up have as obstacles, by vehicle, `found` the ids of what robots have found. `tellings` are all routes
     told anew so far, `reliefs` how far those had come whose part was given to others. `courses` say how each gets on with
-    what it was commanded last.
+    what it was commanded last. `wishes` is how many of the late changes were heeded.
     """
 
     mission: Mission
@@ -70,10 +70,13 @@ class _Memory:
     found: frozenset[str] = frozenset()
     tellings: tuple[Telling, ...] = ()
     reliefs: Mapping[str, Telling] = field(default_factory=dict)
+    wishes: int = 0
     courses: Mapping[str, Course] = field(default_factory=dict)
 
 
-def recovering(mission: Mission, *, delay: float = 0.0, tell: Tell | None = None) -> Director:
+def recovering(
+    mission: Mission, *, delay: float = 0.0, tell: Tell | None = None, changes: Sequence[tuple[float, Changes]] = ()
+) -> Director:
     """Return the director that replans (`mission.replan.replan`) `delay` seconds after a loss is heard of.
 
     Who is heard of again within the delay was a false alarm; who comes back later takes a part of what is left. Who falls
@@ -81,8 +84,13 @@ def recovering(mission: Mission, *, delay: float = 0.0, tell: Tell | None = None
     should it be faster again, it is planned so. Where a robot finds no way to a task, what it found becomes an obstacle of
     the new plan, and the task goes to who can reach it. `tell` gets the time and each new plan. A loss that nobody is left
     to recover from changes nothing until somebody comes back. A triage team sees to its losses itself. Vehicles with a
-    `range` are heard within it alone (`mission.contact`), except in guards plans, where it is how far they see.
+    `range` are heard within it alone (`mission.contact`), except in guards plans, where it is how far they see. `changes`
+    are heeded each at its second of the mission.
+
+    Raises InputError for changes as `asked_for` does.
     """
+    wishes = sorted(changes, key=lambda change: change[0])
+    asked_for(mission, [wish for _, wish in wishes])
     if mission.method == METHOD:
         return default_director(mission)
     first = {v.id: v for v in mission.vehicles}
@@ -117,8 +125,11 @@ def recovering(mission: Mission, *, delay: float = 0.0, tell: Tell | None = None
         )
         speeds = _speeds(now, first)
         stale = {v for v in heard & plan.keys() if now.following.get(v) is not plan[v]}  # replanned while it was silent
-        if due & plan.keys() or back or stale or barred or speeds:
-            after = _replanned(now, mission, time, states, _found([e.data["found"] for e in barred]), speeds, tell)
+        asked = [wish for when, wish in wishes[now.wishes :] if when <= time]
+        now = replace(now, wishes=now.wishes + len(asked))
+        if due & plan.keys() or back or stale or barred or speeds or asked:
+            found = _found([e.data["found"] for e in barred])
+            after = _replanned(now, mission, time, states, found, speeds, asked, tell)
             if after.mission is not now.mission:
                 events = tuple(e for e in events if e not in barred)
             now = after
@@ -128,7 +139,7 @@ def recovering(mission: Mission, *, delay: float = 0.0, tell: Tell | None = None
         slow = {v.id: v for v in now.mission.vehicles}
         courses = {**now.courses, **{v: course(slow[v], states[v], way, time) for v, way in sent.items()}}
         looks = (c.look for v, c in courses.items() if states[v].alive and not (states[v].idle and v not in sent))
-        wake = min([*(now.missed or {}).values(), *looks], default=inf)
+        wake = min([*(now.missed or {}).values(), *looks, *(when for when, _ in wishes[now.wishes :])], default=inf)
         now = replace(now, inner=inner, sent={**now.sent, **sent}, courses=courses, wake=wake)
         return {v: _at_best(c, first[v], slow.get(v, first[v])) for v, c in commands.items()}, now
 
@@ -172,6 +183,7 @@ def _replanned(
     states: Mapping[str, State],
     found: tuple[Obstacle, ...],
     speeds: Mapping[str, float],
+    asked: Sequence[Changes],
     tell: Tell | None,
 ) -> _Memory:
     """Return the memory with a new plan for all who are not given up, or, where nobody is left, the old one."""
@@ -204,6 +216,9 @@ def _replanned(
         obstacles=(*new.values(), *found),
         gone=frozenset(now.wrecks[v] for v in afloat) | (now.found if found else frozenset()),
     )
+    own = len(changes.obstacles)
+    for wish in asked:
+        changes |= wish
     try:
         after = replan(now.mission, progress, changes, anew=True)
     except InputError as error:
@@ -232,7 +247,7 @@ def _replanned(
         serving={v: work for v, work in now.serving.items() if v not in told},
         courses={v: c for v, c in now.courses.items() if v not in told},
         wrecks={v: i for v, i in now.wrecks.items() if v not in afloat} | dict(zip(new, ids, strict=False)),
-        found=frozenset(ids[len(new) :]) if found else now.found,
+        found=frozenset(ids[len(new) : own]) if found else now.found,
         tellings=(*now.tellings, *(_telling(now, time, states[v], route, after) for v, route in told.items())),
         reliefs={v: relief for v, relief in reliefs.items() if v in now.given_up},
     )
@@ -270,6 +285,24 @@ def left_out(memory: Any) -> tuple[Reason, ...]:
     if isinstance(memory, Contact):
         return left_out(memory.inner)
     return memory.mission.reasons if isinstance(memory, _Memory) and memory.tellings else ()
+
+
+def asked_for(mission: Mission, wishes: Sequence[Changes]) -> Mission:
+    """Return the mission with the site and the tasks that are asked for after changes in a run, one after the other.
+
+    Raises InputError if one names what is not there then, or is about vehicles: in a run these change by faults.
+    """
+    for wish in wishes:
+        if mission.method == METHOD:
+            raise InputError("a plan of triage takes no changes in a run: its team knows what is asked from the start")
+        about = sorted(
+            {*wish.lost, *wish.back, *wish.speeds, *wish.batteries, *wish.endurances, *(v.id for v in wish.joined)}
+        )
+        if about:
+            raise InputError(f"vehicle {about[0]!r}: in a run vehicles change by faults (--fail), not by changes")
+        check_changes(mission, wish)
+        mission = replace(mission, site=changed_site(mission.site, wish), tasks=changed_tasks(mission.tasks, wish))
+    return mission
 
 
 def undone(memory: Any) -> tuple[Reason, ...]:

@@ -9,9 +9,9 @@ from shapely.ops import nearest_points
 
 from quarterdeck.coverage.metrics import covered_fraction, track_length
 from quarterdeck.geo.errors import InputError
-from quarterdeck.geo.scenario import Scenario, Site, Task, Vehicle
+from quarterdeck.geo.scenario import Scenario, Site, Vehicle
 from quarterdeck.mission.changes import Changes as Changes
-from quarterdeck.mission.changes import changed_site, check_changes
+from quarterdeck.mission.changes import changed_site, changed_tasks, check_changes
 from quarterdeck.mission.guard_recovery import guards_from_now, with_confirmed
 from quarterdeck.mission.mission import Mission, Route, Waypoint
 from quarterdeck.mission.progress import Progress, budget_left, with_surveyed
@@ -49,7 +49,7 @@ def replan(
         frame=mission.frame,
         site=site,
         vehicles=vehicles,
-        tasks=_tasks(mission, changes),
+        tasks=changed_tasks(mission.tasks, changes),
         casualties=mission.casualties,
         spacing=mission.spacing,
         input_hash=mission.input_hash,
@@ -133,13 +133,6 @@ def _homes(site: Site, vehicles: tuple[Vehicle, ...]) -> tuple[tuple[Vehicle, ..
         else:
             settled.append(vehicle)
     return tuple(settled), reasons
-
-
-def _tasks(mission: Mission, changes: Changes) -> tuple[Task, ...]:
-    """Return the tasks that are asked for, done or not."""
-    edited = {t.id: t for t in changes.edited}
-    tasks = [edited.get(t.id, t) for t in mission.tasks if t.id not in changes.withdrawn]
-    return (*tasks, *changes.tasks)
 
 
 def _rest(mission: Mission, progress: Progress) -> Mission:

@@ -13,6 +13,7 @@ from shapely import LineString
 
 from quarterdeck.coverage.metrics import covered_fraction
 from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.scenario import Site
 from quarterdeck.geo.version import VERSION
 from quarterdeck.mission.fast import FastRun
 from quarterdeck.mission.mission import Mission, Route
@@ -173,6 +174,8 @@ def measure(
     undone: Sequence[Reason] = (),
     relieved: Mapping[str, float] | None = None,
     left_out: Sequence[Reason] = (),
+    during: Mapping[str, tuple[float, float]] | None = None,
+    was: Site | None = None,
     fast: FastRun | None = None,
 ) -> Report:
     """Measure a trace against the mission and judge it.
@@ -182,7 +185,8 @@ def measure(
     told of a log, `triage` what `triage.Compared.document` returns; `servers` the vehicles that served tasks, `undone` why
     others were not served, as `task_reports` takes them; `fast` what the fast world came to. `relieved` are vehicles that
     were lost and when their part was given to others, `left_out` what the plan by then told that nobody can do any more:
-    a loss that was recovered from is told, and does not fail the run.
+    a loss that was recovered from is told, and does not fail the run. `was` has all obstacles that there ever were where
+    some came or went, `during` from when and until when, by id.
     Raises InputError for an unknown limit.
     """
     allowed = check_limits(limits)
@@ -192,7 +196,17 @@ def measure(
     near = closest_approaches(x, y, z, underway, size)
     routes = {route.vehicle: route for route in mission.routes}
     vehicles = tuple(
-        _vehicle(mission, trace, i, bool(finished[i]), bool(aground[i]), routes, near, thin)
+        _vehicle(
+            mission,
+            trace,
+            i,
+            bool(finished[i]),
+            bool(aground[i]),
+            routes,
+            near,
+            thin,
+            sweep(was or mission.site, mission.vehicles[i], trace, i, during),
+        )
         for i in range(len(trace.vehicles))
     )
     gone = lost or [False] * len(vehicles)
@@ -236,12 +250,12 @@ def _vehicle(
     routes: Mapping[str, Route],
     near: tuple[np.ndarray, np.ndarray, np.ndarray],
     thin: int,
+    swept: Swept,
 ) -> VehicleReport:
     vehicle = mission.vehicles[i]
     route = routes.get(vehicle.id, Route(vehicle.id, ()))
     moving = trace.kind[:, i] > 0
     cross = np.abs(trace.cross[:, i].astype(float))
-    swept: Swept = sweep(mission.site, vehicle, trace, i)
     contact = trace.contact[:, i]
     track = np.column_stack([trace.x[:, i], trace.y[:, i], trace.z[:, i]])
     moved = np.linalg.norm(np.diff(track, axis=0), axis=1)

@@ -1,12 +1,12 @@
 """A run under way: all vehicles together, step by step."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from quarterdeck.geo.scenario import Site
+from quarterdeck.geo.scenario import Obstacle, Site
 from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.director import Command, Director, Event, State, wake_time
 from quarterdeck.mission.mission import Mission, Waypoint
@@ -46,6 +46,7 @@ class Running:
     sensing: Sensing
     known: Site
     terrain: Terrain | None = None
+    turns: Sequence[tuple[float, Sequence[Obstacle], Sequence[Obstacle]]] = ()  # when what is gone, and what appears
     time: float = 0.0
     memory: Any = None
     served: dict[str, float] = field(default_factory=dict)
@@ -86,13 +87,17 @@ class Running:
             random = np.random.default_rng([self.seed, 0x5E])
             self.senses = Senses(self.sensing, self.known, self.mission.site, vehicles, pose, random)
         self.router = self.senses.router if self.senses is not None else None
-        blocking = [o for o in self.mission.site.obstacles if o.blocks & {v.domain for v in vehicles}]
+        passing = {o.id for _, old, _ in self.turns for o in old}
+        blocking = [o for o in self.mission.site.obstacles if o.id not in passing and self._blocks(o)]
         self.footing = Footing(vehicles)
         self.trouble: list[str] = []  # with the terrain
         if self.terrain is not None:
             self._lay(self.terrain)
         self.lookout = look_out(self.mission, self.terrain)
         self.world.add_obstacles(blocking, self.terrain)
+        stand = [o for o in self.mission.site.obstacles if o.id in passing]
+        self.bodies = {o.id: self.world.add_obstacles([o] if self._blocks(o) else [], self.terrain) for o in stand}
+        self.ahead = list(self.turns)
         up = np.column_stack([np.zeros((self.count, 2)), self.footing.lift])
         self.world.add_vehicles(vehicles, self.position + up, self.heading)
 
@@ -140,11 +145,22 @@ class Running:
             self.events += self.lookout.step(self.position[:, :2], ~self.aground & ~self.lost)
             self._keep_clear()  # among people and at close quarters a second is too long
 
+    def _blocks(self, obstacle: Obstacle) -> bool:
+        return any(v.domain in obstacle.blocks for v in self.mission.vehicles)
+
+    def _turn(self) -> None:
+        """Let obstacles go and appear whose time it is."""
+        while self.ahead and self.ahead[0][0] <= self.time:
+            _, gone, new = self.ahead.pop(0)
+            self.world.remove_obstacles([body for o in gone for body in self.bodies.pop(o.id, [])])
+            self.bodies |= {o.id: self.world.add_obstacles([o] if self._blocks(o) else [], self.terrain) for o in new}
+
     def decide(self) -> None:
         """Call the director, see to mooring, launching and keeping clear; once a second."""
         if self.time >= self.change:
             self._befall()
         self._run_flat()
+        self._turn()
         reached = self._reached()
         self.events += self._serve(reached)
         self.events += [Event("lost", self.ids[i]) for i in np.flatnonzero(self.aground & ~self.given_up & ~self.lost)]

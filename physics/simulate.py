@@ -9,13 +9,14 @@ import numpy as np
 from quarterdeck.geo.deadline import cause, time_is_up
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.occupancy import Occupancy
-from quarterdeck.geo.scenario import Site
+from quarterdeck.geo.scenario import Obstacle, Site
 from quarterdeck.geo.terrain import Terrain
+from quarterdeck.mission.changes import Changes, changed_site
 from quarterdeck.mission.director import Director
 from quarterdeck.mission.fast import run_fast
 from quarterdeck.mission.inspection import default_director
 from quarterdeck.mission.mission import Mission
-from quarterdeck.mission.recovery import left_out, relieved, tellings, undone
+from quarterdeck.mission.recovery import asked_for, left_out, relieved, tellings, undone
 from quarterdeck.mission.served import served_tasks
 from quarterdeck.mission.told import as_told
 from quarterdeck.mission.triage.plan import METHOD, run_plan
@@ -62,6 +63,7 @@ def simulate(
     duration: float | None = None,
     progress: Callable[[float, float], None] | None = None,
     expected: Director | None = None,
+    changes: Sequence[tuple[float, Changes]] = (),
 ) -> Run:
     """Execute `mission` in PyBullet under `director` (default: its routes, or its schedule of tasks) and judge it.
 
@@ -73,6 +75,9 @@ def simulate(
     time and ten minutes; of all vehicles' times together where a director may replan). `progress` is told seconds done and
     expected. Under `expected`, such as `director` without its side effects (default without a director: the plan's), the
     mission is run in the fast world too, and stands beside the run in the report.
+
+    `changes` are what is asked anew or stands otherwise from a second on, each with its second, of which `director` knows
+    too (`mission.recovery.recovering`): obstacles come and go in the world, and what is asked in the end is judged by.
 
     Raises InputError for a vehicle model without its dynamics or a wrong option, UnavailableError where PyBullet is
     absent.
@@ -101,10 +106,13 @@ def simulate(
     known, director = mission.site, director or default_director(mission)
     there = known.obstacles if sensing.world is None else sensing.world
     plan, mission = mission, replace(mission, site=replace(known, obstacles=(*there, *sensing.unmapped)))
+    turns = _turns(mission.site, changes)
     cut = ""
     with open_world(step) as world:
         air = np.array([*wind, 0.0])
-        run = Running(mission, director, world, seed, np.array(current), air, gusts, befalling, sensing, known, terrain)
+        run = Running(
+            mission, director, world, seed, np.array(current), air, gusts, befalling, sensing, known, terrain, turns
+        )
         builder = TraceBuilder(tuple(v.id for v in mission.vehicles))
         every = max(1, round((sample or step) / step))
         run.decide()
@@ -155,8 +163,15 @@ def simulate(
     if told is not plan and plan.method == "guards":  # each plan numbers its guards anew
         found = served_tasks(told, trace.tracks())
         served, servers = {task: when for task, (when, _) in found.items()}, {task: who for task, (_, who) in found.items()}
+    heeded = [wish for when, wish in changes if when <= run.time]
+    asked, during = asked_for(plan, heeded), {o.id: (0.0, when) for when, old, _ in turns for o in old}
+    during |= {o.id: (when, during.get(o.id, (0.0, np.inf))[1]) for when, _, new in turns for o in new}
+    ever = (*mission.site.obstacles, *(o for _, _, new in turns for o in new))
+    standing = tuple(
+        o for o in ever if during.get(o.id, (0.0, np.inf))[1] > run.time and during.get(o.id, (0.0,))[0] <= run.time
+    )
     report = measure(
-        mission if compared else replace(told, site=mission.site),
+        mission if compared else replace(told, site=replace(asked.site, obstacles=standing), tasks=asked.tasks),
         trace,
         finished=run.finished.tolist(),
         aground=run.aground.tolist(),
@@ -171,6 +186,8 @@ def simulate(
         undone=undone(run.memory),
         relieved={r.route.vehicle: r.time for r in reliefs},
         left_out=left_out(run.memory),
+        during=during,
+        was=replace(mission.site, obstacles=ever),
         fast=fast,
     )
     made = None
@@ -178,6 +195,17 @@ def simulate(
         made = replace(run.router.shared.occupancy(), place=(mission.frame.lon, mission.frame.lat))
         report = replace(report, figures={**report.figures, **agreement(made, mission.site)})
     return Run(trace, report, compared, mission.site, made, told)
+
+
+def _turns(site: Site, changes: Sequence[tuple[float, Changes]]) -> list[tuple[float, list[Obstacle], list[Obstacle]]]:
+    """Return when what obstacles go, and which appear."""
+    turns = []
+    for when, change in sorted(changes, key=lambda c: c[0]):
+        after = changed_site(site, change)
+        old, new = ({o.id: o for o in s.obstacles} for s in (site, after))
+        turns.append((when, [o for i, o in old.items() if i not in new], [o for i, o in new.items() if i not in old]))
+        site = after
+    return [turn for turn in turns if turn[1] or turn[2]]
 
 
 def _check(

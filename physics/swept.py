@@ -2,7 +2,7 @@
 between.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,8 +29,12 @@ class Swept:
     hits: tuple[str, ...]
 
 
-def sweep(site: Site, vehicle: Vehicle, trace: Trace, column: int) -> Swept:
+def sweep(
+    site: Site, vehicle: Vehicle, trace: Trace, column: int, during: Mapping[str, tuple[float, float]] | None = None
+) -> Swept:
     """Sweep the hull of the vehicle in `column` of the trace through the obstacles that block it.
+
+    `during` says of obstacles, by id, from when and until when they were there, s; the others always were.
 
     Between two poses the hull covers the convex hull of its two rectangles, to EXACT. An aerial vehicle above an obstacle
     is clear of it. Where it is not known where the vehicle was nothing is swept.
@@ -38,7 +42,13 @@ def sweep(site: Site, vehicle: Vehicle, trace: Trace, column: int) -> Swept:
     obstacles = [o for o in site.obstacles if vehicle.domain in o.blocks]
     if not obstacles:
         return Swept(float("inf"), 0.0, "", ())
-    runs = [_sweep(obstacles, vehicle, trace, column, run) for run in trace.known(column)]
+    there = {o.id: (during or {}).get(o.id, (0.0, np.inf)) for o in obstacles}
+    runs = []
+    for low, high in sorted(set(there.values())):
+        first, last = np.searchsorted(trace.time, (low, high)).tolist()
+        some = [o for o in obstacles if there[o.id] == (low, high)]
+        parts = [slice(max(run.start, first), min(run.stop, last)) for run in trace.known(column)]
+        runs += [_sweep(some, vehicle, trace, column, part) for part in parts if part.stop > part.start]
     nearest = min(runs, key=lambda run: run.clearance, default=Swept(float("inf"), 0.0, "", ()))
     hit = {name for run in runs for name in run.hits}
     return replace(nearest, hits=tuple(o.id for o in obstacles if o.id in hit))

@@ -63,13 +63,16 @@ class World:
         body = self.bullet.createMultiBody(0, shape, -1, at, physicsClientId=self.client)
         self.bullet.setCollisionFilterGroupMask(body, -1, 1, 1 | BIT["ground"], physicsClientId=self.client)
 
-    def add_obstacles(self, obstacles: Sequence[Obstacle], terrain: Terrain | None = None) -> None:
-        """Add solid prisms, on the terrain if there is one; those that block the same domains share meshes."""
+    def add_obstacles(self, obstacles: Sequence[Obstacle], terrain: Terrain | None = None) -> list[int]:
+        """Add solid prisms, on the terrain if there is one; those that block the same domains share meshes, which are
+        returned.
+        """
 
         def solid(obstacle: Obstacle) -> np.ndarray:
             low, high = terrain.range(obstacle.polygon.bounds) if terrain is not None else (0.0, 0.0)
             return prism(obstacle.polygon, min(low, 0.0) - 1.0, max(high, 0.0) + obstacle.height)
 
+        made = list[int]()
         for blocks in sorted({o.blocks for o in obstacles if o.blocks}, key=sorted):
             soup = np.concatenate([solid(o) for o in obstacles if o.blocks == blocks])
             mask = sum(BIT[domain] for domain in blocks)
@@ -85,6 +88,14 @@ class World:
                 body = self.bullet.createMultiBody(0, shape, physicsClientId=self.client)
                 self.bullet.setCollisionFilterGroupMask(body, -1, 1, mask, physicsClientId=self.client)
                 self.obstacles.add(body)
+                made.append(body)
+        return made
+
+    def remove_obstacles(self, bodies: Sequence[int]) -> None:
+        """Remove what `add_obstacles` has added."""
+        for body in bodies:
+            self.bullet.removeBody(body, physicsClientId=self.client)
+            self.obstacles.discard(body)
 
     def add_vehicles(self, vehicles: Sequence[Vehicle], position: np.ndarray, heading: np.ndarray) -> None:
         """Add a body for each vehicle at `position` (k, 3) and `heading` (k,); it collides with obstacles alone at

@@ -103,16 +103,17 @@ def _with_files(report: dict[str, Any], file: str, plan: str | None) -> dict[str
     found = {name: _found(name if name in options else "log", lay[name], was, home, plan) for name, was in files.items()}
     logs = {name: path for name, path in found.items() if name not in options}
     options |= {name: path for name, path in found.items() if name in options}
-    if isinstance(options.get("tracks"), list):
-        options["tracks"] = [_moved(str(track), logs) for track in options["tracks"]]
+    for name in ("tracks", "changes"):
+        if isinstance(options.get(name), list):
+            options[name] = [_moved(str(track), logs) for track in options[name]]
     return options
 
 
 def _moved(track: str, logs: dict[str, str]) -> str:
-    """Return a --track with its log's path as it is now."""
+    """Return a --track, or --changes, with its file's path as it is now."""
     for lay, path in logs.items():
         before, is_it, after = track.partition(lay)
-        if is_it and before[-1:] in ("", "=") and after[:1] in ("", "#"):
+        if is_it and before[-1:] in ("", "=") and after[:1] in ("", "#", "@"):
             return before + path + after
     return track
 

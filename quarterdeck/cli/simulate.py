@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import contextmanager
 from dataclasses import replace
 from hashlib import sha256
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -32,6 +33,22 @@ if TYPE_CHECKING:
 
 
 DOCUMENTS = ("plan", "unmapped", "world")  # the options that are GeoJSON to read; --terrain is a file too
+
+
+class At(click.ParamType):
+    """FILE@SECONDS: a file of changes, and when they are told."""
+
+    name = "GEOJSON@SECONDS"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the text, once the seconds are a number."""
+        path, at, moment = str(value).rpartition("@")
+        try:
+            if not (at and path and 0 <= float(moment) < inf):
+                raise ValueError
+        except ValueError:
+            self.fail(f"{value!r} is not GEOJSON@SECONDS, such as late.geojson@600", param, ctx)
+        return str(value)
 
 
 class Vector(click.ParamType):
@@ -88,6 +105,8 @@ class Limit(click.ParamType):
     help="What goes wrong: usv-2@600 (lost), gnss:usv-1@300-420, thruster:usv-3@100, comms:usv-1@50, random:3; repeatable.",
 )
 @click.option("--recover", is_flag=True, help="Replan in the run when a vehicle is lost, slow or back.")
+@click.option("--changes", type=At(), multiple=True,
+              help="Late wishes, as for `replan`, and when they are told (with --recover); repeatable.")  # fmt: skip
 @click.option("--delay", type=Real(min=0), default=30.0, show_default=True,
               help="Seconds without a word before a vehicle is given up (with --recover).")  # fmt: skip
 @click.option("--gnss", type=Choice(["rtk", "sbas", "single"]), help="Receivers with errors, instead of perfect ones.")
@@ -138,6 +157,8 @@ def command(
 
     if told and not options["recover"]:
         raise InputError("--told needs --recover: without it the plan is told as it is")
+    if options["changes"] and not options["recover"]:
+        raise InputError("--changes needs --recover: without it nobody replans")
     tell_compiling()
     with limited(time_limit, interruptible=True) as limit:
         mission, run = execute(**options, casualties=bool(snapshots or casualties))
@@ -193,6 +214,7 @@ def execute(
     faults: tuple[str, ...],
     recover: bool,
     delay: float,
+    changes: tuple[str, ...] = (),
     gnss: str | None,
     lidar: bool,
     amcl: bool,
@@ -215,6 +237,7 @@ def execute(
     from quarterdeck.geo.geojson import opened
     from quarterdeck.geo.reader import read_obstacles
     from quarterdeck.geo.terrain import read_terrain
+    from quarterdeck.mission.changes import read_changes
     from quarterdeck.mission.planfile import read_plan
     from quarterdeck.mission.recovery import recovering
     from quarterdeck.mission.triage.plan import METHOD
@@ -230,13 +253,18 @@ def execute(
     strange = read_obstacles(given["unmapped"], mission.frame) if unmapped else ()
     ground = read_terrain(terrain, mission.frame, mission.site.operating.bounds) if terrain else None
     there = read_obstacles(given["world"], mission.frame) if world else None
+    parted = [text.rpartition("@") for text in changes]
+    documents = {path: opened(path) for path, _, _ in parted}
+    files |= {path: sha256(document.data).hexdigest() for path, document in documents.items()}
+    wishes = [(float(moment), read_changes(documents[path], mission)) for path, _, moment in parted]
     mapping = map_file is not None
     sensing = Sensing(gnss, lidar or mapping, amcl, strange, there, mapping, field)
     with _progress(mission.name) as progress:
         run = simulate(
             mission,
-            director=recovering(mission, delay=delay, tell=_replanned) if recover else None,
-            expected=recovering(mission, delay=delay) if recover else None,
+            director=recovering(mission, delay=delay, tell=_replanned, changes=wishes) if recover else None,
+            expected=recovering(mission, delay=delay, changes=wishes) if recover else None,
+            changes=wishes,
             seed=seed,
             step=step,
             current=current,
