@@ -58,9 +58,13 @@ def run_fast(mission: Mission, director: Director, faults: Sequence[Fault] = (),
         run.tracks,
         (*legs.surveyed, *(line for v in legs.routes for line in _lines(legs, v))),
         {v: s.energy_used for v, s in legs.states.items()},
-        frozenset(v for v, s in legs.states.items() if s.alive and s.idle),
+        frozenset(v for v, s in legs.states.items() if s.alive and s.idle and _over(legs, v)),
         run.reason,
     )
+
+
+def _over(legs: "_Legs", vehicle: str) -> bool:
+    return vehicle not in legs.routes or legs.states[vehicle].reached + 1 >= len(legs.routes[vehicle].waypoints)
 
 
 def _arrival(track: np.ndarray) -> float:

@@ -45,6 +45,8 @@ def report_tracks(
     trace, notes = observed_trace(mission, record.tracks, followed)
     served = served_tasks(mission, record.tracks)
     arrived = {t.vehicle for t in record.tracks if np.isfinite(t.arrived)}
+    short = [t for t in record.tracks if t.vehicle not in arrived]
+    notes += [f"{t.vehicle}: its log ends at {t.time[-1]:,.0f} s, before it was home" for t in short]
     report = measure(
         mission,
         trace,

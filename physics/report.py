@@ -303,7 +303,7 @@ def _figures(
         area = mission.site.coverable
         planned = covered_fraction(survey_lines(mission.routes), area, mission.spacing)
         driven = covered_fraction(driven_tracks(trace), area, mission.spacing)
-    elif mission.method == "guards":
+    elif mission.method == "guards" and mission.site.coverable.area:
         routes = [LineString(route.xyz[:, :2]) for route in mission.routes if len(route.waypoints) > 1]
         planned, driven = seen_fraction(mission, routes), seen_fraction(mission, whole_tracks(trace, 0.02))
     moving, sharp = trace.kind > 0, trace.turning
@@ -344,7 +344,7 @@ def _fast_figures(mission: Mission, fast: FastRun) -> dict[str, float | int | No
     covered = None
     if mission.spacing is not None and any(route.survey.any() for route in mission.routes):
         covered = covered_fraction(fast.surveyed, mission.site.coverable, mission.spacing)
-    elif mission.method == "guards":
+    elif mission.method == "guards" and mission.site.coverable.area:
         covered = seen_fraction(mission, [LineString(track[:, 1:]) for track in fast.tracks.values() if len(track) > 1])
     return {
         "time_fast": fast.time,

@@ -15,6 +15,7 @@ from quarterdeck.geo.scenario import Obstacle, Task
 from quarterdeck.mission.assign import assign
 from quarterdeck.mission.changes import Changes
 from quarterdeck.mission.cover import cover
+from quarterdeck.mission.guards import plan_guards
 from quarterdeck.mission.planfile import plan_text
 from quarterdeck.mission.recovery import recovering
 from quarterdeck.physics.simulate import simulate
@@ -75,6 +76,14 @@ def test_a_late_task_is_done_and_judged():
     came = run(mission, (3.0, Changes(tasks=(new,), withdrawn=frozenset({last}))))
     assert {t.id for t in came.report.tasks} == {*(t.id for t in mission.tasks), "late"} - {last}
     assert all(t.driven is not None for t in came.report.tasks)
+
+
+def test_all_withdrawn_sends_guards_home():
+    """Where all that guards were to see is withdrawn in the run, they go home, and nothing was missed."""
+    mission = plan_guards(read_scenario(DATA / "plant_yard.geojson"), range=30.0)
+    came = run(mission, (40.0, Changes(withdrawn=frozenset(a.id for a in mission.site.areas))))
+    assert came.report.passed, came.report.reasons
+    assert came.report.figures["time"] < max(r.duration for r in mission.routes)
 
 
 def test_vehicles_change_by_faults_only():

@@ -94,6 +94,21 @@ def test_trace_gives_its_own_report(driven, tmp_path):
     assert_same(report_tracks(mission, record).report, run.report)
 
 
+def test_a_log_that_ends_under_way_is_told(driven, tmp_path):
+    """The trace of a run that was cut short says so, vehicle by vehicle, beside what was not finished."""
+    from quarterdeck.physics.simulate import simulate
+
+    mission, _ = driven("otter")
+    path = tmp_path / "cut.npz"
+    path.write_bytes(simulate(mission, seed=3, duration=30.0).trace.to_bytes(mission.frame))
+    report = report_tracks(mission, read_tracks(mission, [str(path)])).report
+    ids = [v.id for v in mission.vehicles]
+    assert [n for n in report.notes if "its log ends" in n] == [
+        f"{v}: its log ends at 30 s, before it was home" for v in ids
+    ]
+    assert f"did not finish: {', '.join(ids)}" in report.reasons
+
+
 def test_start_by_setting_off(driven, write_log, tmp_path):
     """Without a word of when it began, the mission begins as the vehicles set off."""
     mission, run = driven("otter")
