@@ -150,7 +150,8 @@ def _survey(mission: Mission, at: float, lost: frozenset[str]) -> tuple[float, f
     speed = np.array([v.speed for v in after.vehicles])
     alone = np.linalg.norm(homes - starts, axis=1) / speed
     bound = max(work / speed.sum(), (away / speed).min(axis=1).max(), alone.max())
-    return total / max(min(shared, anew), at), after.figures["makespan"] / bound
+    # Everyone may be home, with nothing left to do.
+    return total / max(min(shared, anew), at), max(after.figures["makespan"], 1e-9) / max(bound, 1e-9)
 
 
 def planned_tracks(mission: Mission, vehicle: str, at: float) -> tuple[np.ndarray, ...]:

@@ -1,6 +1,7 @@
 """From guards to trees: triangulation, Reduced-CDT, where robots enter it, their trees (fault-tolerant-cdt, Figs 2, 3)."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -30,27 +31,35 @@ class Network:
     forest: Forest
 
 
-def network(reach: MultiPolygon, guards: np.ndarray, starts: np.ndarray) -> Network:
+def network(reach: MultiPolygon, guards: np.ndarray, starts: np.ndarray, *, left: np.ndarray | None = None) -> Network:
     """Return the network on (m, 2) guards for robots that start at (k, 2), all in metres and in `reach`.
 
-    Parts of `reach` that do not hang together are reduced apart. A robot enters at the vertex of the reduced graph that is
-    nearest of those it sees; where it sees none, at the nearest along the triangulation. Robots are no vertices.
-    Raises TriangulationError if a guard is outside.
+    With `left`, indices, trees lead to these guards alone, over a graph of all: it is remembered, and need not be made
+    again for every robot that is lost. Parts of `reach` that do not hang together are reduced apart. A robot enters at the
+    vertex of the reduced graph that is nearest of those it sees; where it sees none, at the nearest along the
+    triangulation. Robots are no vertices. Raises TriangulationError if a guard is outside.
     """
-    mesh = triangulate(reach, guards)
-    cdt = graph_of(mesh.vertices, mesh.edges)
-    count, part = connected_components(_matrix(cdt), directed=False)
-    pieces = [
-        reduced_cdt(cdt, mesh.points[part[mesh.points] == i]).edges for i in range(count) if (part[mesh.points] == i).any()
-    ]
-    reduced = graph_of(mesh.vertices, np.concatenate([np.empty((0, 2), dtype=np.int64), *pieces]))
+    mesh, cdt, reduced = _graphs(reach, np.asarray(guards, dtype=float).tobytes())
+    chosen = mesh.points if left is None else mesh.points[left]
     inside = np.zeros(len(mesh.vertices), dtype=np.bool_)
     inside[mesh.points] = True
     inside[reduced.edges.ravel()] = True
     access = tuple(_access(mesh, cdt, inside, start) for start in np.asarray(starts, dtype=float).reshape(-1, 2))
     entries = np.array([vertex for vertex, _ in access], dtype=np.int64)
-    forest = multi_prims(reduced, mesh.points, entries)
-    return Network(mesh, cdt, reduced, mesh.points, entries, tuple(path for _, path in access), forest)
+    forest = multi_prims(reduced, chosen, entries)
+    return Network(mesh, cdt, reduced, chosen, entries, tuple(path for _, path in access), forest)
+
+
+@lru_cache(maxsize=4)
+def _graphs(reach: MultiPolygon, guards: bytes) -> tuple[Triangulation, Graph, Graph]:
+    """Return the triangulation, its graph and the reduced one; of guards that come as bytes, which can be remembered."""
+    mesh = triangulate(reach, np.frombuffer(guards).reshape(-1, 2))
+    cdt = graph_of(mesh.vertices, mesh.edges)
+    count, part = connected_components(_matrix(cdt), directed=False)
+    pieces = [
+        reduced_cdt(cdt, mesh.points[part[mesh.points] == i]).edges for i in range(count) if (part[mesh.points] == i).any()
+    ]
+    return mesh, cdt, graph_of(mesh.vertices, np.concatenate([np.empty((0, 2), dtype=np.int64), *pieces]))
 
 
 def _matrix(graph: Graph) -> csr_array:

@@ -1,7 +1,9 @@
 """A guards mission from now on: what is left to see, shared out among whoever works, from where they are."""
 
 from collections.abc import Collection
+from contextlib import suppress
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -12,21 +14,24 @@ from quarterdeck.coverage.guards.fewer import needless
 from quarterdeck.coverage.guards.space import Space, border_of, space_of
 from quarterdeck.coverage.network import Network, network
 from quarterdeck.coverage.recovery import recover
+from quarterdeck.geo.errors import QuarterdeckError
 from quarterdeck.geo.scenario import Scenario, as_multipolygon
 from quarterdeck.geo.triangulation import Triangulation, triangulate
 from quarterdeck.geo.visibility import visibility_polygons
 from quarterdeck.mission.guard_routes import Team, Tours, guard_route, shorter_tours
+from quarterdeck.mission.guard_tours import STEPS, STEPS_A_GUARD
 from quarterdeck.mission.guards import enter, guard_ranks, guards_mission, vehicle_ranges
 from quarterdeck.mission.mission import Guard, Mission
 from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.task_recovery import homeward
 from quarterdeck.mission.timing import shortfalls
 
-EFFORT = 0.1  # of the search for a whole plan: robots are waiting
+PROPOSALS = 20_000  # of the search for short tours: robots are waiting
+_sight = lru_cache(maxsize=4)(triangulate)  # of what is seen through: it does not change when a robot is lost
 
 
 def guards_from_now(
-    mission: Mission, scenario: Scenario, served: frozenset[str], *, effort: float = EFFORT, seed: int = 0
+    mission: Mission, scenario: Scenario, served: frozenset[str], *, effort: float | None = None, seed: int = 0
 ) -> Mission:
     """Return the mission that sees what `mission`, a guards plan, has not confirmed to have seen.
 
@@ -36,6 +41,7 @@ def guards_from_now(
     supportive ones (`coverage.recovery.recover`), then all orders are searched anew. Where the site has changed, guards
     are added. What cannot be seen any more, for want of a way or of energy, is told as an area, and makes it infeasible.
     Where all that was to be seen is withdrawn, everybody goes home.
+    `effort` is that of the search for a whole plan; by default its PROPOSALS are as few as milliseconds allow.
     """
     if not scenario.site.coverable.area:
         return _withdrawn(mission, scenario, served)
@@ -43,22 +49,31 @@ def guards_from_now(
     whole, team, lonely = enter(space_of(scenario), scenario.vehicles, ranges, under_way=True)
     if mission.parameters.get("inspect") == "border":
         whole = replace(whole, target=border_of(whole.target))
-    mesh = triangulate(whole.sight)
+    mesh = _sight(whole.sight)
     seen = _confirmed(mission, scenario, served)
     target = _unseen(whole, mesh, seen.values())
     if target.area <= TOLERANCE * whole.target.area:
         target = shapely.MultiPolygon()
     space = replace(whole, target=target)
     same = _same_needs(mission, scenario, float(ranges.min()))
-    guards, owners = _left(mission, space, mesh, team, seen, all_needed=same)
-    guards, hidden = (guards, shapely.MultiPolygon()) if same else mend(space, mesh, guards, float(ranges.min()))
-    owners += [None] * (len(guards) - len(owners))
-    net = network(space.reach, guards, team.starts)
+    left = _left(mission, space, mesh, team, seen, all_needed=same)
+    guards, hidden = _places(mission.guards)[left], shapely.MultiPolygon()
+    if same:
+        known = _inside(space, _places(mission.guards))
+        every, number = np.unique(_places(mission.guards)[known], axis=0, return_inverse=True)
+        net = network(space.reach, every, team.starts, left=number[np.searchsorted(known, left)])
+    else:
+        guards, hidden = mend(space, mesh, guards, float(ranges.min()))
+        net = network(space.reach, guards, team.starts)
+    owners = [mission.guards[i].vehicle for i in left] + [None] * (len(guards) - len(left))
     start = Tours(guards, net, _shared(net, owners, mission, team), (), (), np.zeros(len(ranges)), 0.0)
     ranks = guard_ranks(scenario, space, mesh, guards, float(ranges.min())) if len(guards) else None
+    effort = PROPOSALS / (STEPS + STEPS_A_GUARD * len(guards)) if effort is None else effort
     short = shorter_tours(space, start, team, ranks=ranks, effort=effort, seed=seed)
     tours = _affordable(space, short, team, ranks)
-    after = guards_mission(scenario, space, mesh, tours, team, ())
+    # What the plan was proved to see from all its guards it sees from those that are left and those that are seen.
+    proved = same and len(left) + len(seen) == len(mission.guards) and bool((tours.owners >= 0).all())
+    after = guards_mission(scenario, space, mesh, tours, team, (), proved=proved)
     lost = after.figures["certificate"]["uncovered"]
     told = f"{lost:.6g} m2 can no longer be seen" + _why(hidden.area, lonely.area, lost)
     return replace(
@@ -90,6 +105,13 @@ def _withdrawn(mission: Mission, scenario: Scenario, served: frozenset[str]) -> 
         reasons=tuple(missing),
         layers=(),
     )
+
+
+def prepare(mission: Mission) -> None:
+    """Work out what a loss does not change, such as ways between corners, so that the first one waits no longer."""
+    scenario = Scenario(mission.name, mission.frame, mission.site, mission.vehicles, tasks=mission.tasks)
+    with suppress(QuarterdeckError):  # told where it matters
+        guards_from_now(mission, scenario, frozenset(), effort=0.0)
 
 
 def _same_needs(mission: Mission, scenario: Scenario, reach: float) -> bool:
@@ -145,17 +167,21 @@ def _left(
     seen: Collection[int],
     *,
     all_needed: bool,
-) -> tuple[np.ndarray, list[str | None]]:
-    """Return the guards that are still needed, and the vehicle that was to pass each; in the order of the plan's tours."""
+) -> list[int]:
+    """Return the guards, by number, that are still needed; in the order of the plan's tours."""
     places = _places(mission.guards)
-    inside = shapely.contains_xy(space.reach, places[:, 0], places[:, 1])
+    inside = set(_inside(space, places).tolist())
     turns = [(g.turn is None, g.turn or 0, i) for i, g in enumerate(mission.guards)]
-    order = [i for _, _, i in sorted(turns) if inside[i] and i not in seen]
+    order = [i for _, _, i in sorted(turns) if i in inside and i not in seen]
     kept = order
     if order and not all_needed:
         views = visibility_polygons(mesh, places[order], float(team.ranges.min()))
         kept = [i for i, drop in zip(order, needless(space.target, views), strict=True) if not drop]
-    return places[kept].reshape(-1, 2), [mission.guards[i].vehicle for i in kept]
+    return kept
+
+
+def _inside(space: Space, places: np.ndarray) -> np.ndarray:
+    return np.flatnonzero(shapely.contains_xy(space.reach, places[:, 0], places[:, 1]))
 
 
 def _places(guards: Collection[Guard]) -> np.ndarray:

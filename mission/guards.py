@@ -81,12 +81,21 @@ def plan_guards(
 
 
 def guards_mission(
-    scenario: Scenario, space: Space, mesh: Triangulation, tours: Tours, team: Team, reasons: Sequence[Reason]
+    scenario: Scenario,
+    space: Space,
+    mesh: Triangulation,
+    tours: Tours,
+    team: Team,
+    reasons: Sequence[Reason],
+    *,
+    proved: bool = False,
 ) -> Mission:
-    """Return the mission that follows tours, with its figures and its certificate."""
+    """Return the mission that follows tours, with its figures and its certificate, where it is not `proved` already."""
     routes = tuple(guard_route(v, tours, i) for i, v in enumerate(team.vehicles))
     passed = np.flatnonzero(tours.owners >= 0)
-    rest = uncovered(space, visibility_polygons(mesh, tours.guards[passed], team.ranges[tours.owners[passed]]))
+    rest = MultiPolygon()
+    if not proved:
+        rest = uncovered(space, visibility_polygons(mesh, tours.guards[passed], team.ranges[tours.owners[passed]]))
     short = [line for vehicle, route in zip(team.vehicles, routes, strict=True) for line in shortfalls(vehicle, route)]
     figures: dict[str, Any] = {
         "guards": len(passed),

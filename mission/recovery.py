@@ -20,6 +20,7 @@ from quarterdeck.geo.scenario import Obstacle, Vehicle, as_multipolygon
 from quarterdeck.mission.changes import Changes, changed_site, changed_tasks, check_changes
 from quarterdeck.mission.contact import Contact, within_range
 from quarterdeck.mission.director import Command, Director, Event, State
+from quarterdeck.mission.guard_recovery import prepare
 from quarterdeck.mission.inspection import Memory as Inspected
 from quarterdeck.mission.inspection import default_director
 from quarterdeck.mission.lateness import Course, course, looked, measured_pace
@@ -94,6 +95,8 @@ def recovering(
     if mission.method == METHOD:
         return default_director(mission)
     first = {v.id: v for v in mission.vehicles}
+    if mission.method == "guards":
+        prepare(mission)
 
     def direct(
         time: float, states: Mapping[str, State], events: tuple[Event, ...], memory: Any
