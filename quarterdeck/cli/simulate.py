@@ -58,11 +58,9 @@ class Vector(click.ParamType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
         """Return (east, north)."""
-        if isinstance(value, tuple):
-            return value
         try:
-            east, north = (float(part) for part in value.split(","))
-        except ValueError:
+            east, north = (float(part) for part in (value if isinstance(value, tuple) else value.split(",")))
+        except (ValueError, TypeError):
             self.fail(f"{value!r} is not two numbers with a comma, such as 0.3,-0.1", param, ctx)
         return east, north
 
@@ -75,7 +73,7 @@ class Limit(click.ParamType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, float]:
         """Return (name, value)."""
         if isinstance(value, tuple):
-            return value
+            value = "=".join(map(str, value))
         name, _, number = value.partition("=")
         try:
             return name.strip(), float(number)
