@@ -82,7 +82,7 @@ def telling_moments(outcome: Outcome) -> list[tuple[float, str]]:
     }
     found: list[tuple[float, str]] = []
     seen = set()
-    for entry in outcome.log:
+    for entry in (e for e in outcome.log if e.time >= outcome.team.began):  # how it was before, there is no track of
         key = (entry.what, entry.whom if entry.what == "state" else "")
         if entry.what == "lost":
             found.append((entry.time, f"{entry.who} {'is lost' if entry.about == 'stop' else 'is not heard any more'}"))
@@ -100,7 +100,7 @@ def telling_moments(outcome: Outcome) -> list[tuple[float, str]]:
             apart.append(moment)
     apart.append((end, "the run was cut short" if outcome.run.reason else "the end"))
     while 1 < len(apart) < 6:
-        before, after = max(pairwise([(0.0, ""), *apart]), key=lambda pair: pair[1][0] - pair[0][0])
+        before, after = max(pairwise([(outcome.team.began, ""), *apart]), key=lambda pair: pair[1][0] - pair[0][0])
         time = (before[0] + after[0]) / 2
         counts = [
             sum(t is not None and t <= time for t in times)

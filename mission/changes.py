@@ -18,6 +18,7 @@ from quarterdeck.geo.properties import GEOMETRIES, property_problems
 from quarterdeck.geo.reader import added, read_additions
 from quarterdeck.geo.scenario import Area, Obstacle, Site, Task, Vehicle, as_multipolygon
 from quarterdeck.mission.mission import Mission
+from quarterdeck.mission.triage.plan import METHOD, on_foot, settings_of
 
 # What each role's features can say beside `add`; `set` with the properties that it may give.
 EDITS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
@@ -35,12 +36,13 @@ class Changes:
 
     `lost` vehicles did nothing any more from `since` on (seconds of the plan, by id; now where none is given). `back` are
     vehicles that were given up and work again, with where they are, (x, y) metres, or None for where they were last.
-    `speeds` in m/s, `batteries` Wh and `endurances` s that vehicles have left, `priorities` of areas, `edited` tasks in the
-    place of those of the same id; `operating` is added.
+    `medics` are those of the `joined` who treat casualties. `speeds` in m/s, `batteries` Wh and `endurances` s that
+    vehicles have left, `priorities` of areas, `edited` tasks in the place of those of the same id; `operating` is added.
     """
 
     lost: frozenset[str] = frozenset()
     joined: tuple[Vehicle, ...] = ()
+    medics: frozenset[str] = frozenset()
     obstacles: tuple[Obstacle, ...] = ()
     gone: frozenset[str] = frozenset()
     areas: tuple[Area, ...] = ()
@@ -90,14 +92,18 @@ def read_changes(source: str | Path | Document, mission: Mission) -> Changes:
     if not any(added(raw) for raw in features):
         return changes
     new = read_additions(document, mission.frame, tasks=[t.id for t in mission.tasks])
-    strange = "casualty" if new.casualties else "medic" if new.medics else "rendezvous" if new.rendezvous else None
-    if strange:
-        raise InputError(f"{name}: a plan has no {strange}; leave it out")
+    triage = mission.method == METHOD
+    known = {"casualty": new.casualties, "medic": () if triage else new.medics, "rendezvous": new.rendezvous}
+    if strange := next((role for role, some in known.items() if some), None):
+        why = "a plan of triage can change no" if triage else "a plan has no"
+        raise InputError(f"{name}: {why} {strange}; leave it out")
+    medics = tuple(on_foot(m, xy, settings_of(mission)) for m, xy in new.medics)
     if new.spacing is not None and mission.spacing is not None and abs(new.spacing - mission.spacing) > 1e-6:
         raise InputError(f"{name}: spacing {new.spacing:g} m, but the plan's is {mission.spacing:g} m; leave it out")
     widened = any(added(raw) and raw["properties"]["role"] == "operating" for raw in features)
     return changes | Changes(
-        joined=new.vehicles,
+        joined=(*new.vehicles, *medics),
+        medics=frozenset(v.id for v in medics),
         obstacles=new.site.obstacles,
         areas=new.site.areas,
         tasks=new.tasks,
@@ -254,6 +260,13 @@ def check_changes(mission: Mission, changes: Changes) -> None:
             raise InputError(f"area {of_areas[0]!r}: a plan of tasks covers no areas; make one with `quarterdeck plan`")
     elif changes.tasks or changes.edited or changes.withdrawn - {*areas}:
         raise InputError(f"a plan made by {mission.method!r} does no tasks; a plan of `quarterdeck assign` does")
+    elif mission.method == METHOD:
+        if changes.priorities:
+            raise InputError(
+                f"area {min(changes.priorities)!r}: all of the field is searched alike; leave its priority out"
+            )
+        if at_sea := [v.id for v in changes.joined if v.domain == "surface"]:
+            raise InputError(f"vehicle {at_sea[0]!r}: on water it has no part in triage; give a UGV, a UAV or a medic")
 
 
 def _set_anew(changes: Changes) -> set[str]:

@@ -10,6 +10,7 @@ from shapely import LineString
 from quarterdeck.geo.errors import InputError
 from quarterdeck.mission.mission import Mission, Route, unbroken
 from quarterdeck.mission.timing import RESERVE
+from quarterdeck.mission.triage.records import Stand
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +21,8 @@ class Progress:
     which survey legs were driven, `served` the ids of tasks done. `along` says how far along its route each vehicle is, as
     the seconds at which it would be there by the plan; None: as planned, at `time`. `headings` are radians by vehicle,
     where they are known, `servers` who did a task, where it may be another vehicle than planned. `begun` are the tasks that
-    are under way: by whom, and for how many seconds; None: as planned, where who is to be there is.
+    are under way: by whom, and for how many seconds; None: as planned, where who is to be there is. `stand` is what the
+    director of a triage mission has in mind; there `tracks` are the UGVs' whole ways.
     """
 
     time: float
@@ -32,6 +34,7 @@ class Progress:
     headings: Mapping[str, float] = field(default_factory=dict)
     servers: Mapping[str, str] = field(default_factory=dict)
     begun: Mapping[str, tuple[str, float]] | None = None
+    stand: Stand | None = None
 
 
 def planned_progress(mission: Mission, time: float, *, stopped: Mapping[str, float] | None = None) -> Progress:

@@ -19,6 +19,7 @@ from quarterdeck.mission.remaining import remaining_parts
 from quarterdeck.mission.served import served_tasks
 from quarterdeck.mission.survey_recovery import VISITED
 from quarterdeck.mission.track import Track, energy_used
+from quarterdeck.mission.triage.stand import read_stand, stand_document
 
 FINE = 1e-3  # spacings: tracks are thinned by no more
 JUST = 10.0  # s: what is just done, or about to be, may count as either
@@ -127,12 +128,13 @@ def progress_state(mission: Mission, progress: Progress) -> dict[str, Any]:
             v: {
                 "position": [*degrees([place[:2]])[0], round(place[2], 3)],
                 "energy": round(progress.energy[v], 3),
-                "along": round((progress.along or {})[v], 3),
+                "along": round((progress.along or {}).get(v, progress.time), 3),
             }
             for v, place in progress.positions.items()
         },
         "served": sorted(progress.served),
         "tracks": [degrees(line) for line in progress.tracks],
+        **({} if progress.stand is None else {"triage": stand_document(progress.stand)}),
     }
 
 
@@ -152,12 +154,14 @@ def read_state(mission: Mission, path: str, *, lost: frozenset[str] = frozenset(
             served=frozenset(map(str, state["served"])),
             along={v: float(s["along"]) for v, s in state["vehicles"].items()},
         )
-        of = state["input_hash"]
+        of, triage = state["input_hash"], state.get("triage")
     except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError):
         kind = f"is {kind}" if (kind := kind_of(data)) not in (None, REPORT) else "is no report with a state in it"
         raise InputError(f"{path}: {kind}; write a report with `simulate` or `report --report`") from None
     if of != mission.input_hash:
         raise InputError(f"{path}: is the report of another plan (its site's SHA-256 differs)")
+    if triage is not None:
+        progress = replace(progress, stand=read_stand(triage, mission, path))
     for vehicle in mission.vehicles:
         if vehicle.id not in progress.positions and vehicle.id not in lost:
             raise InputError(f"{path}: does not say where {vehicle.id} is; say --lost {vehicle.id}")

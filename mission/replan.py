@@ -21,6 +21,8 @@ from quarterdeck.mission.routes import survey_lines
 from quarterdeck.mission.survey_recovery import survey_from_now
 from quarterdeck.mission.task_recovery import assign_from_now, tasks_left
 from quarterdeck.mission.timing import shortfalls, timed_route
+from quarterdeck.mission.triage.carry_on import triage_from_now
+from quarterdeck.mission.triage.plan import METHOD
 
 NOTHING = Changes()
 LANDED = 0.5  # m above ground, and at the least from its end: who is so near, or within its length, is at home
@@ -39,7 +41,11 @@ def replan(
     Raises InputError if a change names what is not in the plan, means nothing to it, or nobody is left.
     """
     check_changes(mission, changes)
-    if not (changes or anew) and as_planned(mission, progress):
+    triage = mission.method == METHOD
+    if progress.stand is not None:  # who stopped on the way is lost, whether or not the change says so
+        dead = progress.stand.memory.out & {v.id for v in mission.vehicles} - changes.back.keys()
+        changes = replace(changes, lost=changes.lost | dead)
+    if not (changes or anew or triage) and as_planned(mission, progress):
         return _over(mission, with_confirmed(_rest(mission, progress), progress.served), progress.time)
     seed = mission.seed if seed is None else seed
     site = changed_site(mission.site, changes)
@@ -54,7 +60,9 @@ def replan(
         spacing=mission.spacing,
         input_hash=mission.input_hash,
     )
-    if mission.method == "guards":
+    if triage:
+        after = triage_from_now(mission, scenario, progress, changes, seed=seed)
+    elif mission.method == "guards":
         after = guards_from_now(mission, scenario, progress.served, seed=seed)
     elif mission.method == "assign":
         after = assign_from_now(mission, scenario, progress, seed=seed)
@@ -64,12 +72,13 @@ def replan(
         raise InputError(f"a plan made by {mission.method!r} has no survey lines to share out; plan the rest as a site")
     gone = {v.id: _moved(v, progress) for v in (*mission.lost, *mission.vehicles)}
     working = {v.id for v in vehicles}
+    own = after.parameters if triage else mission.parameters
     after = replace(
         after,
         routes=tuple(_airborne(r, v, progress) for v, r in zip(vehicles, after.routes, strict=True)),
-        parameters=dict(mission.parameters) | {"replanned_at": progress.time, "lost": sorted(changes.lost)},
+        parameters=dict(own) | {"replanned_at": progress.time, "lost": sorted(changes.lost)},
         seed=seed,
-        reasons=(*stranded, *after.reasons),
+        reasons=(*(r for r in stranded if r.about not in own.get("medics", ())), *after.reasons),
         lost=tuple(v for i, v in gone.items() if i not in working),
     )
     return _over(mission, after, progress.time)

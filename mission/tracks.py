@@ -15,6 +15,7 @@ from quarterdeck.mission.cleaning import cleaned
 from quarterdeck.mission.mission import Mission, Route
 from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.track import Track, set_off, since, until_home
+from quarterdeck.mission.triage.plan import METHOD
 
 LATE, ANOTHER_DAY = 60.0, 43_200.0  # s after the plan: told, and taken for another mission
 PLACES, LITTLE = 500, 0.2  # of a track looked at; a part that is too little
@@ -97,7 +98,7 @@ def record(mission: Mission, files: Sequence[Sequence[tuple[str, Log]]], *, star
         logs.setdefault(name, []).append(log)
         notes += [n for n in log.notes if n not in notes]
     raw = {}
-    routes = {r.vehicle: r for r in mission.routes if r.waypoints}
+    routes, triage = {r.vehicle: r for r in mission.routes if r.waypoints}, mission.method == METHOD
     for vehicle in mission.vehicles:
         if vehicle.id not in routes:
             reasons.append(Reason(f"{vehicle.id}: the plan has no route for it"))
@@ -126,10 +127,11 @@ def record(mission: Mission, files: Sequence[Sequence[tuple[str, Log]]], *, star
         if abs(late) > ANOTHER_DAY:
             why = f"{vehicle_id}: sets off {late:,.0f} s after the mission's start; is its log of another day?"
             reasons.append(Reason(why))
-        elif abs(late) > LATE:
+        elif abs(late) > LATE and not triage:
             notes.append(f"{vehicle_id}: sets off {late:,.0f} s later than planned, counted from the mission's start")
-        tracks.append(until_home(mission.vehicle(vehicle_id), routes[vehicle_id], moved))
-    reasons += map(Reason, _on_other_routes(mission, tracks))
+        # A triage plan's routes are what everybody would do if nobody were found: they tell neither when nor where.
+        tracks.append(moved if triage else until_home(mission.vehicle(vehicle_id), routes[vehicle_id], moved))
+    reasons += [] if triage else map(Reason, _on_other_routes(mission, tracks))
     lost = []
     for vehicle in mission.lost:  # it has no route: its clock is the others', or the mission's
         if vehicle.id in logs:

@@ -6,7 +6,7 @@ thousands of missions a minute can be studied.
 
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 from typing import Any, Literal
 
@@ -15,9 +15,11 @@ import numpy as np
 
 from quarterdeck.geo.deadline import cause, time_is_up
 from quarterdeck.mission.director import Command, Director, Event, State, wake_time
+from quarterdeck.mission.mission import Waypoint
 
 SAME = 1e-9  # s: events this close are one moment
 EDGE = 1e-6  # m: contact is lost this far beyond the range, so that a range just reached is not lost by rounding
+MOST_TIME = 7 * 86400.0  # s
 _MOST_CALLS = 10_000  # at one moment: a director that commands for ever without time passing is wrong
 
 
@@ -67,7 +69,7 @@ class Run:
     """What happened. `tracks` (n, 3) seconds, x, y by actor, straight in between; `events` (time, event) in order.
 
     `end` is the time of the last event, or when the run was cut short: `reason` says why, if it was. `memory` is what the
-    director had in mind then.
+    director had in mind then, `states` how everybody stood at `until`, `left` what of the commands was left then.
     """
 
     tracks: Mapping[str, np.ndarray]
@@ -75,6 +77,8 @@ class Run:
     end: float
     memory: Any
     reason: str = ""
+    states: Mapping[str, State] = field(default_factory=dict)
+    left: Mapping[str, tuple[Waypoint, ...]] = field(default_factory=dict)
 
     def length(self, actor: str) -> float:
         """Return the metres that an actor moved."""
@@ -89,7 +93,7 @@ def run_world(
     reach: float,
     *,
     faults: Sequence[Fault] = (),
-    until: float = 7 * 86400.0,
+    until: float = MOST_TIME,
 ) -> Run:
     """Run until nothing more can happen, or the time `until` in seconds.
 
@@ -202,9 +206,13 @@ def run_world(
                 knots = plans[i].knots, plans[j].knots
                 switch[k] = _crossing(*knots, reach + EDGE if contact[k] else reach, now, not contact[k])
         log += [(now, e) for e in events]
+    last = until if until < inf else now
+    states = {ids[i]: _state(plans[i], actors[i].z, last, alive[i]) for i in range(n)}
+    left = {ids[i]: plan.left(last) for i, plan in enumerate(plans)}
     for i, plan in enumerate(plans):
         tracks[i].append(plan.knots if reason == "" else _until(plan.knots, until))
-    return Run({ids[i]: _joined(tracks[i]) for i in range(n)}, tuple(log), until if reason else now, memory, reason)
+    ways = {ids[i]: _joined(tracks[i]) for i in range(n)}
+    return Run(ways, tuple(log), until if reason else now, memory, reason, states, left)
 
 
 class _Plan:
@@ -213,12 +221,13 @@ class _Plan:
     `used` watt-hours before it, of an actor whose energy is reckoned.
     """
 
-    __slots__ = ("end", "knots", "power", "served", "tasks", "told", "used")
+    __slots__ = ("end", "knots", "power", "served", "tasks", "told", "used", "waypoints")
 
     def __init__(self, time: float, x: float, y: float, actor: Actor, command: Command | tuple, used: float = 0.0) -> None:
         speed, self.power, self.used = actor.speed, actor.power, used
         knots, self.served, self.tasks = [(time, x, y)], [], []
-        for w in command.waypoints if isinstance(command, Command) else ():
+        self.waypoints = command.waypoints if isinstance(command, Command) else ()
+        for w in self.waypoints:
             if w.time > time:
                 time = w.time
                 knots.append((time, x, y))
@@ -261,6 +270,14 @@ class _Plan:
         speed = np.hypot(np.diff(x), np.diff(y)) / np.where(step > 0, step, 1.0)
         spent = np.diff(np.minimum(time, now)) @ self.power(speed)
         return self.used + float(spent + self.power(np.zeros(1))[0] * max(now - self.end, 0.0)) / 3600.0
+
+    def left(self, now: float) -> tuple[Waypoint, ...]:
+        """Return the waypoints that are not over, of the first the hold that is left."""
+        reached = bisect_right(self.served, now + SAME)
+        rest = self.waypoints[reached:]
+        if rest and rest[0].hold > self.served[reached] - now:
+            rest = (replace(rest[0], hold=self.served[reached] - now), *rest[1:])
+        return rest
 
     def tasks_until(self, now: float) -> list[str]:
         """Take out and return the tasks that are over."""

@@ -16,12 +16,16 @@ from quarterdeck.mission.recorded import progress_state, recorded_progress
 from quarterdeck.mission.served import served_tasks
 from quarterdeck.mission.track import NEAR, Track, energy_used, pace
 from quarterdeck.mission.tracks import Record
+from quarterdeck.mission.triage.plan import METHOD, run_plan, scenario_of
+from quarterdeck.mission.triage.sight import seen_by
+from quarterdeck.mission.triage.team import field_of
 from quarterdeck.physics.paths import LEGS, vehicle_limits
 from quarterdeck.physics.report import Report, measure
 from quarterdeck.physics.seen import unseen, whole_tracks
-from quarterdeck.physics.simulate import Run
+from quarterdeck.physics.simulate import LATE, Run
 from quarterdeck.physics.swath import TOLERANCE, driven_tracks
 from quarterdeck.physics.trace import COLUMNS, UNKNOWN, Trace
+from quarterdeck.physics.triage import expected, side_by_side, told_by_tracks
 
 FINEST, COARSEST = 0.1, 1.0  # s between samples
 MOST = 1_000_000  # samples: of longer missions they are farther apart
@@ -43,6 +47,8 @@ def report_tracks(
     """
     followed = [follow(mission, t) for t in record.tracks]
     trace, notes = observed_trace(mission, record.tracks, followed)
+    if mission.method == METHOD:
+        return _triage_tracks(mission, record, trace, notes, limits or {}, settings or {})
     served = served_tasks(mission, record.tracks)
     arrived = {t.vehicle for t in record.tracks if np.isfinite(t.arrived)}
     short = [t for t in record.tracks if t.vehicle not in arrived]
@@ -62,8 +68,52 @@ def report_tracks(
     return Run(trace, report)
 
 
-def with_state(mission: Mission, report: Report, tracks: Sequence[Track]) -> Report:
-    """Return the report with where the mission stands at the end of its tracks; as it is where not all have a route."""
+def _triage_tracks(
+    mission: Mission,
+    record: Record,
+    trace: Trace,
+    notes: Sequence[str],
+    limits: Mapping[str, float],
+    settings: Mapping[str, Any],
+) -> Run:
+    """Measure a triage mission by its tracks: what was searched, who could be found and treated, energy, fence, encounters.
+
+    There is no route to be off, nor an end to come to: both follow from who is found where.
+    """
+    fast = run_plan(mission)
+    trace = replace(trace, cross=np.zeros_like(trace.cross))
+    driven = told_by_tracks(mission, trace, fast)
+    report = measure(
+        expected(mission, fast),
+        trace,
+        finished=[True] * len(mission.vehicles),
+        aground=[False] * len(mission.vehicles),
+        served={},
+        limits={"delay": LATE} | dict(limits),
+        settings=settings,
+        trouble=[*(str(r) for r in record.reasons), *driven.reasons],
+        notes=(*record.notes, *notes, "who was told of whom, and when, tracks do not tell"),
+        triage=side_by_side(fast, driven, ("undeliverable", "medic_idle")),
+    )
+    field = field_of(scenario_of(mission))
+    planned, searched = (seen_by(o.team, o.run.tracks).intersection(field).area / field.area for o in (fast, driven))
+    figures = {**report.figures, "coverage_planned": planned, "coverage_driven": searched}
+    allowed = report.limits["coverage_loss"]
+    short = f"searched {searched:.2%} of the field, {planned:.2%} in the fast world"
+    reasons = (*report.reasons, *([short] if allowed is not None and planned - searched > allowed else []))
+    return Run(trace, replace(report, figures=figures, reasons=reasons))
+
+
+def with_state(mission: Mission, run: Run, tracks: Sequence[Track]) -> Report:
+    """Return the report with where the mission stands at the end of its tracks; as it is where that is not known.
+
+    It is not where a vehicle has no route, and of a triage mission that was not simulated.
+    """
+    report = run.report
+    if run.triage is not None:
+        return replace(report, state=progress_state(mission, run.triage.progress))
+    if mission.method == METHOD:
+        return report
     if {r.vehicle for r in mission.routes if r.waypoints} != {v.id for v in mission.vehicles}:
         return report
     until = max((float(t.time[-1]) for t in tracks), default=0.0)

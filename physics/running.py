@@ -196,6 +196,12 @@ class Running:
         silent = {f.vehicle for f in self.faults if f.kind == "comms" and f.start <= self.time < f.end < np.inf}
         return any(mute[i] and i in silent for i in np.array(self.ids)[~self.aground & ~self.lost])
 
+    def standing(self) -> tuple[dict[str, State], dict[str, tuple[Waypoint, ...]]]:
+        """Return how everybody stands, and what of his command is left to do."""
+        reached = self._reached()
+        states = self._states(reached, dict.fromkeys(self.ids, False))
+        return states, {id: self.commands.get(id, ())[n:] for id, n in zip(self.ids, reached.tolist(), strict=True)}  # noqa: A001
+
     def record(self, builder: TraceBuilder) -> None:
         """Add a sample to the trace."""
         tracks = self.fleet.gather("tracks")

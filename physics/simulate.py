@@ -136,7 +136,7 @@ def simulate(
     compared = None
     if aside is not None:
         late = cut or ("" if run.done else f"the mission was not over after {until:,.0f} s")
-        compared = compare(mission, run.memory, trace, late, aside)
+        compared = compare(mission, run.memory, trace, late, aside, run.standing())
         mission = compared.expected
     elif cut:
         run.trouble.append(cut)

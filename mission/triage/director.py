@@ -26,29 +26,49 @@ def triage(team: Team, policy: Policy, settings: Settings) -> Director:
     Its events: `seen` by a UGV or medic (subject the casualty; data `x`, `y`, `sort`, for medics
     `category`, for robots `error`, how far off they take it to be), `met`
     (two in range), `served` (a medic's treatment is over), `lost` (data `kind`: stop, or mute: only the device failed),
-    `returned` (the device works again).
+    `returned` (the device works again). A team with a stand goes on from there; the director's times count from the
+    mission's beginning, the world's from the stand.
     """
+    began = team.began
+    gone = {name: State(x, y, alive=False) for name, (x, y) in team.gone.items()}
 
     def direct(
         time: float, states: Mapping[str, State], events: tuple[Event, ...], memory: Memory | None
     ) -> tuple[dict[str, Command], Any]:
-        desk = Desk(team, policy, settings, time, states, memory)
+        known = memory or (team.stand.memory if team.stand else None)
+        desk = Desk(team, policy, settings, time + began, {**states, **gone} if gone else states, known)
         if memory is None:
-            _begin(desk)
-            return desk.commands, desk.memory()
+            if team.stand:
+                desk.commands = {name: Command(left) for name, left in team.stand.left.items() if name not in gone}
+                watch_energy(desk)
+            else:
+                _begin(desk)
+            return _answer(desk)
         for event in events:
             _notice(desk, event)
         for name in desk.agents:
-            if not states[name].alive:
+            if not desk.states[name].alive:
                 desk.lose(name, "stop")
         for name in tuple(desk.agents):
-            if desk.agents[name].moving and states[name].idle and name not in desk.commands and name not in desk.out:
+            if desk.agents[name].moving and desk.states[name].idle and name not in desk.commands and name not in desk.out:
                 _ROOM[type(desk.agents[name])].arrived(desk, name)
         _talk(desk, {(e.vehicle, e.subject) for e in events if e.kind == "met"})
         watch_energy(desk)
-        return desk.commands, desk.memory()
+        return _answer(desk)
 
     return direct
+
+
+def _answer(desk: Desk) -> tuple[dict[str, Command], Memory]:
+    """Return commands and memory, what times the world reads of them in its own."""
+    commands, memory, began = desk.commands, desk.memory(), desk.team.began
+    if began:
+        memory = replace(memory, wake=memory.wake - began)
+        commands = {
+            name: Command(tuple(replace(w, time=max(w.time - began, 0.0)) if w.time else w for w in c.waypoints))
+            for name, c in commands.items()
+        }
+    return commands, memory
 
 
 _ROOM = {Ugv: ugv, Uav: uav, Medic: medic}

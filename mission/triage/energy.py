@@ -44,4 +44,4 @@ def _in_hand(desk: Desk, name: str, robot: Robot) -> float:
     power = max(vehicle.model.power(vehicle.speed), vehicle.model.power_idle)
     wait = desk.settings.linger if isinstance(desk.agents[name], Ugv) else 0.0
     by_battery = (battery - state.energy_used - home.energy) * 3600.0 / power - wait
-    return min(by_battery, endurance - desk.time - home.duration - wait)
+    return min(by_battery, endurance - (desk.time - desk.team.began) - home.duration - wait)

@@ -102,13 +102,29 @@ def stay(desk: Desk, name: str) -> None:
         ugv = min(free, key=lambda u: (hypot(free[u][0] - here[0], free[u][1] - here[1]), u))
         desk.change(name, called=me.called | {ugv}, heading_for="")
         desk.fire(name, "section overdue")
-        desk.drive(name, desk.team.on_foot(here, desk.stand(name, free[ugv])), _speed(desk, me))
+        desk.drive(name, desk.team.on_foot(here, desk.stand(name, free[ugv])), _speed(desk, name))
         return
     later = [t for s in me.board if desk.time + 1e-6 < (t := due(desk, s, me.board)) < inf]
     if later:
-        desk.drive(name, [desk.here(name)], _speed(desk, me), hold=min(later) - desk.time)
+        desk.drive(name, [desk.here(name)], _speed(desk, name), hold=min(later) - desk.time)
     else:
         desk.send(name, ())
+
+
+def restart(desk: Desk, name: str) -> None:
+    """Set out again for what he was doing, from where he is."""
+    me: Medic = desk.agents[name]
+    if me.state == "treat":
+        x, y = desk.here(name)
+        desk.send(name, [Waypoint(x, y, hold=max(me.treat_until - desk.time, 0.0), task=me.queue[0].id)])
+    elif me.state in ("go", "plan"):
+        desk.change(name, heading_for="")
+        _plan(desk, name)
+    elif me.state == "fetch":
+        _fetch(desk, name)
+    else:
+        desk.change(name, state="idle")
+        stay(desk, name)
 
 
 def device_failed(desk: Desk, name: str) -> None:
@@ -128,7 +144,7 @@ def _fetch(desk: Desk, name: str) -> None:
     here = desk.here(name)
     place = min(desk.team.depots, key=lambda d: (hypot(d[0] - here[0], d[1] - here[1]), d))
     desk.change(name, heading_for="")
-    desk.drive(name, desk.team.on_foot(here, desk.stand(name, place)), _speed(desk, desk.agents[name]))
+    desk.drive(name, desk.team.on_foot(here, desk.stand(name, place)), _speed(desk, name))
 
 
 def _look_around(desk: Desk, name: str, report: Report, sigmas: float) -> None:
@@ -139,7 +155,7 @@ def _look_around(desk: Desk, name: str, report: Report, sigmas: float) -> None:
     spacing = LEGS * max(desk.settings.medic_sees, 0.1)
     ways = desk.team.on_foot
     corners = [*ways(desk.here(name), (x, y)), *expanding_square((x, y), around, spacing, ways)]
-    desk.drive(name, corners, _speed(desk, desk.agents[name]))
+    desk.drive(name, corners, _speed(desk, name))
 
 
 def meets_medic(desk: Desk, one: str, other: str) -> None:
@@ -160,15 +176,16 @@ def belief(desk: Desk, name: str) -> Belief:
     stops = tuple((r.x, r.y, RANK[r.sort]) for r in (me.queue[1:] if treating else me.queue))
     busy = max(0.0, me.treat_until - desk.time) if treating else 0.0
     seconds = desk.settings.treat["red"] / (1.0 + desk.settings.help_gain * me.helpers)
-    return Belief(desk.time, *desk.here(name), _speed(desk, me), seconds, busy, stops)
+    return Belief(desk.time, *desk.here(name), _speed(desk, name), seconds, busy, stops)
 
 
 def _category(me: Medic, casualty: str) -> str:
     return (me.examined or {}).get(casualty, "red")
 
 
-def _speed(desk: Desk, me: Medic) -> float:
-    return desk.settings.medic_speed * max(0.5, 1.0 - desk.settings.fatigue * me.walked / 100.0)
+def _speed(desk: Desk, name: str) -> float:
+    me: Medic = desk.agents[name]
+    return desk.team.pace(name, desk.settings) * max(0.5, 1.0 - desk.settings.fatigue * me.walked / 100.0)
 
 
 def _strike_off(desk: Desk, name: str, casualty: str) -> None:
@@ -201,7 +218,7 @@ def _plan(desk: Desk, name: str) -> None:
     walked = me.walked + ((here[0] - me.last[0]) ** 2 + (here[1] - me.last[1]) ** 2) ** 0.5
     desk.change(name, heading_for=queue[0].id, walked=walked, last=here, looked=0)
     corners = desk.team.on_foot(here, desk.stand(name, (queue[0].x, queue[0].y)))
-    desk.drive(name, corners, _speed(desk, desk.agents[name]))
+    desk.drive(name, corners, _speed(desk, name))
 
 
 def _in_order(desk: Desk, name: str, reports: tuple[Report, ...]) -> tuple[Report, ...]:

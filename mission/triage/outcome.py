@@ -4,15 +4,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
+import numpy as np
+
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Scenario
 from quarterdeck.mission.triage.director import triage
-from quarterdeck.mission.triage.records import Entry, Memory
+from quarterdeck.mission.triage.records import Entry, Memory, Stand
 from quarterdeck.mission.triage.search import Search
 from quarterdeck.mission.triage.settings import METHODS, Settings
 from quarterdeck.mission.triage.sight import seen_by
 from quarterdeck.mission.triage.team import Team, field_of, make_team, targets
-from quarterdeck.mission.world import Fault, Run, run_world
+from quarterdeck.mission.world import MOST_TIME, Fault, Run, run_world
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,16 +102,30 @@ def run_team(
         known = {*names, *(v.id for v in scenario.vehicles)}
         if fault.actor not in known:
             raise InputError(f"--fail {fault.actor}: nobody has this name; use one of {', '.join(sorted(known))}")
-    faults = [f for f in faults if f.actor in names]
+    there = {*names} - team.gone.keys()
+    faults = [f for f in faults if f.actor in there]
     faults = [replace(f, kind="mute") if f.actor in team.medics and f.kind == "stop" else f for f in faults]
+    run = run_members(scenario, team, method, settings, seed=seed, faults=faults)
+    return replace(judge(scenario, team, method, settings, run, seed=seed), faults=tuple(faults))
+
+
+def run_members(
+    scenario: Scenario,
+    team: Team,
+    method: str,
+    settings: Settings,
+    *,
+    seed: int,
+    faults: Sequence[Fault] = (),
+    until: float = MOST_TIME,
+) -> Run:
+    """Run a team in the fast world for `until` seconds at the most; see `run_world`."""
     actors = team.actors(settings)
-    robots = len(team.ugvs)
     # What UGVs have to tell each other, they tell while they wait together: the moment of their meeting is nothing.
-    pairs = [(i, j) for i, j in combinations(range(len(actors)), 2) if j >= robots]
+    pairs = [(i, j) for i, j in combinations(range(len(actors)), 2) if actors[j].id not in team.ugvs]
     seen = targets(scenario, settings, seed)
     director = triage(team, METHODS[method], settings)
-    run = run_world(director, actors, seen, pairs, reach_of(method, settings), faults=faults)
-    return replace(judge(scenario, team, method, settings, run, seed=seed), faults=tuple(faults))
+    return run_world(director, actors, seen, pairs, reach_of(method, settings), faults=faults, until=until)
 
 
 def reach_of(method: str, settings: Settings) -> float:
@@ -121,12 +137,21 @@ def judge(scenario: Scenario, team: Team, method: str, settings: Settings, run: 
     """Return what became of every casualty in a run, in whichever world: `run.memory` is the director's."""
     seen = targets(scenario, settings, seed)
     memory: Memory = run.memory
+    if team.stand is not None:
+        run = _since_the_beginning(run, team.stand)
     fates = _fates(scenario, memory.log, {t.id: t.data for t in seen})
     searched = [e.time for e in memory.log if e.what == "state" and e.whom == "section searched"]
     end = run.end if run.reason else max([0.0, *searched, *(f.treated for f in fates if f.treated is not None)])
     told = {t.id: (t.x + t.data["error"][0], t.y + t.data["error"][1]) for t in seen}
     reasons = _reasons(scenario, team, fates, memory, run)
     return Outcome(scenario, method, settings, seed, team, fates, memory.log, run, end, reasons, told)
+
+
+def _since_the_beginning(run: Run, stand: Stand) -> Run:
+    """Return a run that goes on from a stand with its times from the mission's beginning, and those who are gone in it."""
+    tracks = {name: track + np.array([stand.time, 0.0, 0.0]) for name, track in run.tracks.items()}
+    tracks |= {name: np.array([(stand.time, x, y)] * 2) for name, (x, y) in stand.gone.items()}
+    return replace(run, tracks=tracks, end=stand.time + run.end)
 
 
 def _fates(scenario: Scenario, log: Sequence[Entry], data: Mapping[str, Mapping[str, str]]) -> tuple[Fate, ...]:
@@ -166,7 +191,9 @@ def _fates(scenario: Scenario, log: Sequence[Entry], data: Mapping[str, Mapping[
 
 def _reasons(scenario: Scenario, team: Team, fates: Sequence[Fate], memory: Memory, run: Run) -> tuple[str, ...]:
     reasons = [run.reason] if run.reason else []
-    searched, taken = ({e.about for e in memory.log if e.what == what} for what in ("searched", "takes over"))
+    log = [e for e in memory.log if team.stand is None or e.time >= team.stand.shared_out]  # before, sections were others
+    searched, taken = ({e.about for e in log if e.what == what} for what in ("searched", "takes over"))
+    searched |= {e.about for e in log if e.what == "shared out"}
     home = {e.who: e.time for e in memory.log if e.what == "turns home"}
     for name in team.ugvs:
         if name not in searched and (name in memory.out or name in home):

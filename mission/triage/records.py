@@ -4,6 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
 
+from shapely import MultiPolygon
+
+from quarterdeck.mission.mission import Waypoint
+
 XY = tuple[float, float]
 
 
@@ -154,3 +158,23 @@ class Memory:
     log: tuple[Entry, ...] = ()
     look: Mapping[str, float] = field(default_factory=dict)
     wake: float = inf
+
+
+@dataclass(frozen=True, slots=True)
+class Stand:
+    """How far a mission has come `time` seconds after it began: what the director has in mind, as of then.
+
+    `left` is what remains of each member's command, `paths` what each UGV searches, `homes` where UAVs hover and from which
+    second on, `depots` as in a team; `seen` is what of the field UGVs have seen, `gone` are members that are not there any
+    more, with where they were last, `shared_out` when the search was divided as it is.
+    """
+
+    time: float
+    memory: Memory
+    left: Mapping[str, tuple[Waypoint, ...]]
+    paths: Mapping[str, tuple[XY, ...]]
+    homes: Mapping[str, tuple[tuple[float, XY], ...]]
+    depots: tuple[XY, ...]
+    seen: MultiPolygon
+    gone: Mapping[str, XY]
+    shared_out: float

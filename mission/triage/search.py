@@ -23,6 +23,7 @@ from quarterdeck.mission.triage.records import XY
 
 _SEEN = 0.99  # of the sensing range counts: round ends of a track's swath are drawn with corners
 _ROUNDS = 4
+_SPECK = 1e-3  # of the sensing range's square: nobody lies hidden in less
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,27 +39,39 @@ MOST_CELLS = 500_000  # of the field's box: what sensors see along so long a pat
 
 @lru_cache(maxsize=64)
 def search_paths(
-    field: MultiPolygon, free: MultiPolygon, starts: tuple[XY, ...], spacing: float, sees: float, ways: Ways
+    field: MultiPolygon,
+    free: MultiPolygon,
+    starts: tuple[XY, ...],
+    spacing: float,
+    sees: float,
+    ways: Ways,
+    *,
+    rest: bool = False,
 ) -> Search:
     """Divide the field between UGVs at `starts` and return the path of each, from its start on.
+
+    Of a field that is the `rest` of one, crumbs and strips are looked at in passing, from outside where need be.
 
     `free` is where their reference points may be; lanes are `spacing` metres apart, sensors reach `sees` metres. Raises
     InputError if no UGV can search any of it.
     """
     room = as_multipolygon(free.intersection(field))
     paths = _tours(room, starts, spacing) if not room.is_empty else None
+    if paths is None and rest:
+        paths = tuple(np.array([start]) for start in starts)
     if paths is None:
         raise InputError("the UGVs can enter no part of the field; check the obstacles and the vehicles' clearance")
     missed = _missed(field, paths, starts, sees)
+    speck = max(1e-6 * field.area, _SPECK * sees**2)
     least, best = missed.area, paths
-    for _ in range(_ROUNDS):
-        if least < 1e-6 * field.area:
+    for _ in range(3 * _ROUNDS if rest else _ROUNDS):
+        if least < speck:
             break
-        paths = _with_visits(paths, _places(missed, room, sees), ways)
+        paths = _with_visits(paths, _places(missed, free if rest else room, sees), ways)
         missed = _missed(field, paths, starts, sees)  # it may grow at first: a detour leaves the leg that it is put into
         if missed.area < least:
             least, best = missed.area, paths
-    return Search(best, float(least) if least >= 1e-6 * field.area else 0.0)
+    return Search(best, float(least) if least >= speck else 0.0)
 
 
 def _tours(room: MultiPolygon, starts: tuple[XY, ...], spacing: float) -> tuple[np.ndarray, ...] | None:
@@ -131,7 +144,9 @@ def _with_visits(paths: tuple[np.ndarray, ...], places: list[XY], ways: Ways) ->
 
 
 def _corners(path: np.ndarray) -> np.ndarray:
-    """Leave out the points of a path at which it goes straight on."""
+    """Leave out the points of a path at which it goes straight on, or stays."""
+    moves = np.hypot(*np.diff(path, axis=0).T) > 1e-9
+    path = path[np.concatenate([[True], moves])]
     if len(path) < 3:
         return path
     d = np.diff(path, axis=0)

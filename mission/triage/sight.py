@@ -13,14 +13,21 @@ from quarterdeck.mission.triage.team import Team
 _THINNED = 0.1  # m that a track may lose where it is drawn with fewer corners
 
 
-def seen_by(team: Team, tracks: Mapping[str, np.ndarray], until: float = inf) -> MultiPolygon:
-    """Return what the UGVs of a team have seen until a second, by their (n, 3) tracks of seconds, x, y; square metres."""
-    swaths = []
+def seen_by(team: Team, tracks: Mapping[str, np.ndarray], until: float = inf, *, surely: bool = False) -> MultiPolygon:
+    """Return what the UGVs of a team have seen until a second: by their (n, 3) tracks of seconds, x, y, and before.
+
+    Its edge is drawn to a decimetre; what lies within is `surely` seen where that is taken off it.
+    """
+    swaths = [*([team.stand.seen] if team.stand else [])]
     for name, robot in team.ugvs.items():
+        if name not in tracks:
+            continue
         track = tracks[name]
         moment = min(until, float(track[-1, 0]))
         path = np.vstack([track[track[:, 0] <= moment, 1:], track_at(track, np.array([moment]))])
-        swaths.append(LineString(np.vstack([path, path[-1:]])).simplify(_THINNED).buffer(robot.sees))
+        swaths.append(
+            LineString(np.vstack([path, path[-1:]])).simplify(_THINNED).buffer(robot.sees - 2 * _THINNED * surely)
+        )
     return as_multipolygon(shapely.union_all(swaths, grid_size=1e-3))
 
 

@@ -1,7 +1,7 @@
 """The team at work: what is fixed before the mission starts, made from a scenario and checked once."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from math import inf
 
@@ -15,7 +15,7 @@ from quarterdeck.geo.scenario import Scenario, Vehicle, as_multipolygon
 from quarterdeck.geo.transit import roadmap, shortest_path
 from quarterdeck.mission.mission import Waypoint
 from quarterdeck.mission.triage.chase import Ways, straight
-from quarterdeck.mission.triage.records import XY
+from quarterdeck.mission.triage.records import XY, Stand
 from quarterdeck.mission.triage.search import Search, search_paths
 from quarterdeck.mission.triage.settings import METHODS, SORT, Colour, Settings
 from quarterdeck.mission.world import Actor, Target
@@ -60,6 +60,8 @@ class Team:
     """Who works on a site, and how they get about. `medics` are starts by id; `ground`, `foot`
     and `air` are where UGVs, medics and UAVs may be.
 
+    `stand` is how far the mission had come before; `paces` are speeds of medics in m/s, where they are not the settings'.
+
     `depots` are where spare devices for medics are, and where who has nobody to report to comes: the rendezvous or, without
     any, where medics start. `distances` gives the medics' (n, n) metres between (n, 2) points; `on_ground`, `on_foot` and
     `in_air` shortest paths.
@@ -77,25 +79,49 @@ class Team:
     on_foot: Ways
     in_air: Ways
     distances: Callable[[np.ndarray], np.ndarray]
+    stand: Stand | None = None
+    paces: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def began(self) -> float:
+        """The seconds from the mission's beginning to this part of it."""
+        return 0.0 if self.stand is None else self.stand.time
+
+    @property
+    def gone(self) -> Mapping[str, XY]:
+        """Members that are not there any more, and where they were last."""
+        return {} if self.stand is None else self.stand.gone
+
+    def pace(self, medic: str, settings: Settings) -> float:
+        """Return a medic's speed."""
+        return self.paces.get(medic, settings.medic_speed)
 
     def actors(self, settings: Settings) -> list[Actor]:
-        """Return everybody for the world: UGVs, UAVs, medics."""
+        """Return everybody who is there for the world: UGVs, UAVs, medics."""
         on_the_spot = max(settings.medic_sees, 0.1)
-        return [
+        everybody = [
             *(Actor(u.id, *u.start, speed=u.speed, sees=u.sees, power=u.power) for u in self.ugvs.values()),
             *(Actor(u.id, *u.start, z=u.z, speed=u.speed, power=u.power) for u in self.uavs.values()),
-            *(Actor(m, *xy, speed=settings.medic_speed, sees=on_the_spot) for m, xy in self.medics.items()),
+            *(Actor(m, *xy, speed=self.pace(m, settings), sees=on_the_spot) for m, xy in self.medics.items()),
         ]
+        return [a for a in everybody if a.id not in self.gone]
 
 
 def make_team(
-    scenario: Scenario, method: str, settings: Settings, search: Search | None = None, *, bodies: bool = False
+    scenario: Scenario,
+    method: str,
+    settings: Settings,
+    search: Search | None = None,
+    *,
+    bodies: bool = False,
+    stand: Stand | None = None,
 ) -> Team:
     """Return the team of a scenario for a method; `search` gives the UGVs other paths than their tours.
 
     With `bodies` nobody is a point: medics keep clear of walls, UGVs wait side by side around the rendezvous, UAVs one
-    above the other. Raises InputError, in one line, if there is no UGV or medic, no UAV for a method that needs one, or a
-    casualty, medic or rendezvous is where nobody can get.
+    above the other. From a `stand` the mission goes on, with the search that belongs to it: what was checked at its
+    beginning is so no more. Raises InputError, in one line, if there is no UGV or medic, no UAV for a method that needs
+    one, or a casualty, medic or rendezvous is where nobody can get.
     """
     if method not in METHODS:
         raise InputError(f"unknown method {method!r}; use one of {', '.join(METHODS)}")
@@ -106,7 +132,7 @@ def make_team(
         raise InputError('no UGV to search with; add a vehicle with "domain": "ground"')
     if not scenario.medics:
         raise InputError('no medic; add a Point with "role": "medic"')
-    if not scenario.site.areas:
+    if not scenario.site.areas and stand is None:
         raise InputError('no field to search; give the polygon to be searched "role": "area"')
     if policy.receiver == "uav" and not uavs:
         raise InputError(f'method {method} needs a UAV; add a vehicle with "domain": "aerial", or use --method no-relay')
@@ -115,14 +141,17 @@ def make_team(
     foot = scenario.site.navigable("ground", load_model("walker").clearance if bodies else 0.0)
     on_ground, on_foot = ways_in(ground), ways_in(foot)
     air = scenario.site.navigable("aerial", max((u.clearance for u in uavs), default=0.0))
-    _check(scenario)
+    if stand is None:
+        _check(scenario)
     spacing = scenario.spacing or settings.spacing
     sees = [u.range or settings.ugv_sees for u in ugvs]
     field = field_of(scenario)
     starts = tuple((float(u.start[0]), float(u.start[1])) for u in ugvs)
     if search is None:
         search = search_paths(field, ground, starts, spacing, min(sees), on_ground)
-    points = _rendezvous(scenario, search) if policy.receiver == "uav" else ()
+    points: tuple[XY, ...] = ()
+    if policy.receiver == "uav":
+        points = stand.depots if stand else _rendezvous(scenario, search)
     routes = [tuple(Waypoint(float(x), float(y), leg="survey", speed=u.speed) for x, y in p)
               for u, p in zip(ugvs, search.paths, strict=True)]  # fmt: skip
     berths = _berths(ugvs, search.paths, points) if bodies else [(0.0, 0.0)] * len(ugvs)
@@ -130,11 +159,11 @@ def make_team(
         u.id: Robot(u.id, u, u.start, u.speed, s, path=r, berth=b, standoff=_STANDOFF * bodies)
         for u, s, r, b in zip(ugvs, sees, routes, berths, strict=True)
     }
-    homes: list[tuple[tuple[float, XY], ...]] = [
-        ((0.0, points[i % len(points)]),) for i in range(len(uavs) if points else 0)
-    ]
+    homes: list[tuple[tuple[float, XY], ...]] = [((0.0, p),) for p in _in_turn(points, len(uavs))]
     if settings.rendezvous == "moving" and points:
         homes = [_moving(robots, ground) or homes[0]] * len(uavs)
+    if stand is not None and points:
+        homes = [stand.homes.get(u.id, ((0.0, p),)) for u, p in zip(uavs, _in_turn(points, len(uavs)), strict=False)]
     used = uavs if policy.receiver == "uav" else []
     room = min((u.ceiling - u.altitude for u in used), default=0.0) / max(len(used), 1)
     step = min(_ABOVE, max(room, 0.0)) * bodies
@@ -154,7 +183,12 @@ def make_team(
         on_foot=on_foot,
         in_air=ways_in(air),
         distances=_distances(on_foot),
+        stand=stand,
     )
+
+
+def _in_turn(points: Sequence[XY], count: int) -> list[XY]:
+    return [points[i % len(points)] for i in range(count if points else 0)]
 
 
 def field_of(scenario: Scenario) -> MultiPolygon:

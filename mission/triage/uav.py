@@ -103,12 +103,29 @@ def go_home(desk: Desk, name: str) -> None:
     desk.send(name, waypoints)
 
 
+def restart(desk: Desk, name: str) -> None:
+    """Set out again for what it was doing, from where it is; what was meant for a medic who is gone goes to another."""
+    me: Uav = desk.agents[name]
+    load = tuple((r, _choose(desk, me, (), r)) if to in me.unreachable else (r, to) for r, to in me.load)
+    desk.change(name, load=load)
+    if me.state == "home":
+        _land(desk, name)
+    elif me.state == "deliver":
+        _fly_to_medic(desk, name)
+    else:
+        go_home(desk, name)
+
+
 def turn_home(desk: Desk, name: str) -> None:
     """Fly home on what the battery has left, and land. It tells a medic who comes by; UGVs keep what it has not told."""
-    robot = desk.team.uavs[name]
     if desk.fire(name, "battery low"):
-        way = [Waypoint(x, y, robot.z, speed=robot.speed) for x, y in way_home(desk, name)]
-        desk.send(name, [*way, replace(way[-1], z=0.0, leg="landing")])
+        _land(desk, name)
+
+
+def _land(desk: Desk, name: str) -> None:
+    robot = desk.team.uavs[name]
+    way = [Waypoint(x, y, robot.z, speed=robot.speed) for x, y in way_home(desk, name)]
+    desk.send(name, [*way, replace(way[-1], z=0.0, leg="landing")])
 
 
 def way_home(desk: Desk, name: str) -> list[XY]:

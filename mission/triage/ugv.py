@@ -179,6 +179,27 @@ def way_home(desk: Desk, name: str, corners: Sequence[XY] | None = None) -> list
     return [*via, *(desk.team.on_ground(here, desk.stand(name, vehicle.home)) if vehicle.returns else [here])]
 
 
+def restart(desk: Desk, name: str) -> None:
+    """Set out again for what it was doing, from where it is."""
+    me: Ugv = desk.agents[name]
+    if me.state == "explore":
+        resume(desk, name)
+    elif me.state == "return":
+        _back(desk, name)
+    elif me.state == "deliver":
+        _report(desk, name)
+    elif me.state == "wait":
+        _wait(desk, name)
+    elif me.state == "seek":
+        _look_for_medic(desk, name)
+    elif me.state == "continued explore":
+        arrived(desk, name)
+    elif me.state == "home":
+        _drive(desk, name, way_home(desk, name, []))
+    else:
+        stand_by(desk, name)
+
+
 def stand_by(desk: Desk, name: str) -> None:
     """Done with its section, it takes over one that is overdue; else it waits where others come, until one could be."""
     write_own(desk, name)

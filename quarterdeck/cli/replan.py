@@ -110,18 +110,24 @@ def _progress(
     from quarterdeck.mission.progress import planned_progress
     from quarterdeck.mission.recorded import read_state, recorded_progress
     from quarterdeck.mission.tracks import read_tracks
+    from quarterdeck.mission.triage.carry_on import planned_stand
+    from quarterdeck.mission.triage.plan import METHOD
 
     if tracks and state:
         raise InputError("--track and --state both say what happened; give one of them")
     if start and not tracks:
         raise InputError("--start says when the logs' mission began; it needs --track")
+    if tracks and mission.method == METHOD:
+        raise InputError("--track: logs do not tell who was found, told of and treated; give --at, or --state REPORT")
     if state:
         progress = read_state(mission, state, lost=frozenset(stopped))
         if time is not None and time < progress.time - 1.0:
             raise InputError(f"--at {time:g}: {state} is of {progress.time:.0f} s; leave --at out, or give --track")
         if any(math.isfinite(since) for since in stopped.values()):
             raise InputError("--lost ID@SECONDS needs --track: a report does not tell what was done when; write --lost ID")
-        return progress if time is None else replace(progress, time=time)
+        if time is not None and mission.method == METHOD and time > progress.time + 1.0:
+            raise InputError(f"--at {time:g}: {state} is of {progress.time:.0f} s, and what came after is not known")
+        return progress if time is None or mission.method == METHOD else replace(progress, time=time)
     if tracks:
         record = read_tracks(mission, tracks, start=read_time(start) if start else None)
         wrong = [r for r in record.reasons if not (r.kind == "track" and r.about in stopped)]
@@ -134,6 +140,8 @@ def _progress(
         return progress
     if time is None:
         raise InputError("--at is missing: seconds since the mission's start; or give --track or --state")
+    if mission.method == METHOD:
+        return planned_stand(mission, time, stopped=stopped)
     return planned_progress(mission, time, stopped=stopped)
 
 

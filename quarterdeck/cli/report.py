@@ -86,7 +86,7 @@ def execute(
     logs = dict.fromkeys(track_file([v.id for v in (*mission.vehicles, *mission.lost)], given)[1] for given in tracks)
     data = {"plan": document.data} | {path: read_bytes(path) for path in logs}
     files = {name: sha256(content).hexdigest() for name, content in data.items()}
-    report = with_state(mission, run.report, record.tracks)
+    report = with_state(mission, run, record.tracks)
     return mission, replace(run, report=replace(report, command={"verb": "report", "options": options, "files": files}))
 
 

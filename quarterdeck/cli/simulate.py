@@ -173,7 +173,7 @@ def command(
     if report or as_json:
         from quarterdeck.physics.observed import with_state
 
-        run = replace(run, report=with_state(mission, run.report, run.trace.tracks()))
+        run = replace(run, report=with_state(mission, run, run.trace.tracks()))
     if report:
         emit(run.report.to_json(), report, force=force)
     if rrd:

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import jsonschema
 import numpy as np
@@ -10,11 +11,16 @@ from shapely import box
 
 from quarterdeck.exporters.triage_picture import telling_moments
 from quarterdeck.geo.deadline import limited
+from quarterdeck.geo.reader import read_scenario
 from quarterdeck.geo.scenario import Casualty, Obstacle, Scenario, Site
 from quarterdeck.geo.terrain import Terrain
+from quarterdeck.mission.changes import Changes
 from quarterdeck.mission.check import check_mission
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.planfile import plan_text, read_plan
+from quarterdeck.mission.recorded import read_state
+from quarterdeck.mission.replan import replan
+from quarterdeck.mission.tracks import Record
 from quarterdeck.mission.triage.generate import generate, paper_team
 from quarterdeck.mission.triage.plan import plan_triage, run_plan
 from quarterdeck.physics.report import report_schema
@@ -85,6 +91,63 @@ def test_who_fails_in_pybullet_takes_no_reported_casualty_along(fault: str, tmp_
             assert fate.treated is not None or fate.undeliverable
         if fate.state != "treated":
             assert any(f"casualty {fate.id} " in reason for reason in run.report.reasons)
+
+
+def test_the_tracks_of_a_run_tell_what_was_searched_and_whom_a_medic_stood_by(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    """Measured from its tracks alone a run has the same finds and treatments; no route is held against anybody."""
+    from quarterdeck.physics.observed import report_tracks
+    from quarterdeck.physics.simulate import simulate
+
+    mission = planned(yard(), tmp_path)
+    run = simulate(mission)
+    assert run.triage is not None
+    logs = run.trace.tracks()
+    report = report_tracks(mission, Record(logs, (), (), None), settings={"tracks": [], "start": None}).report
+    assert report.triage is not None
+    for told, fate in zip(report.triage["casualties"], run.triage.driven.fates, strict=True):
+        assert told["found"][1] == pytest.approx(fate.found, abs=1.5)
+        assert told["treated"][1] == pytest.approx(fate.treated, abs=6.0)
+    assert report.figures["coverage_driven"] > 0.98
+    assert report.reasons == ()
+    jsonschema.Draft202012Validator(report_schema()).validate(json.loads(report.to_json()))
+    alone = tuple(track for track in logs if track.vehicle != "medic1")
+    reasons = report_tracks(mission, Record(alone, (), (), None)).report.reasons
+    assert sum("was not treated, by the tracks" in r for r in reasons) == 4
+
+
+def test_a_mission_goes_on_from_the_report_of_a_run(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    """A run is stopped; replanned from its report, without the UAV, all are treated and what was found stays found."""
+    from quarterdeck.physics.observed import with_state
+    from quarterdeck.physics.simulate import simulate
+
+    mission = planned(yard(), tmp_path)
+    run = simulate(mission, duration=40.0)
+    assert run.triage is not None
+    path = tmp_path / "report.json"
+    path.write_text(with_state(mission, run, run.trace.tracks()).to_json(), encoding="utf-8")
+    jsonschema.Draft202012Validator(report_schema()).validate(json.loads(path.read_text(encoding="utf-8")))
+    progress = read_state(mission, str(path))
+    for changes in (Changes(), Changes(lost=frozenset({"uav1"}))):
+        outcome = run_plan(replan(mission, progress, changes))
+        assert outcome.reasons == ()
+        for before, after in zip(run.triage.driven.fates, outcome.fates, strict=True):
+            assert before.found is None or after.found == pytest.approx(before.found, abs=1e-3)
+            assert before.treated is None or after.treated == pytest.approx(before.treated, abs=1e-3)
+    assert any(f.found is not None for f in run.triage.driven.fates)
+
+
+@pytest.mark.parametrize("faults", [(), ("medic1@60",)])
+def test_the_sample_drill_is_driven_to_its_end(faults: tuple[str, ...]) -> None:
+    """Nobody stands in another's way for good, hulls stay apart, and every casualty of the sample is treated."""
+    from quarterdeck.physics.simulate import simulate
+
+    site = read_scenario(Path(__file__).parents[2] / "data" / "triage_drill.geojson")
+    run = simulate(plan_triage(site), faults=faults, duration=1200.0)
+    assert run.triage is not None
+    assert all(f.treated is not None for f in run.triage.driven.fates)
+    assert all(v.finished for v in run.report.vehicles)
+    assert run.report.figures["separation"] > 0.0
+    assert run.trace.time[-1] < 1000.0
 
 
 def test_rough_ground_is_climbed_and_seen_over(tmp_path) -> None:  # type: ignore[no-untyped-def]
