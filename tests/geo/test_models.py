@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from quarterdeck.geo.errors import InputError
-from quarterdeck.geo.models import load_model
+from quarterdeck.geo.models import load_model, model_names
 
 VEHICLES = Path(__file__).parents[2] / "data" / "vehicles"
 
@@ -18,3 +18,11 @@ def test_an_aerial_vehicle_climbs(tmp_path, line):
     path.write_text("".join(line if text.startswith("climb_rate") else text for text in lines), encoding="utf-8")
     with pytest.raises(InputError, match="climb_rate"):
         load_model(str(path))
+
+
+def test_who_turns_on_the_spot_has_room_to() -> None:
+    """A hull that keeps its clearance touches nothing whichever way it points."""
+    for name in model_names():
+        model = load_model(name)
+        if model.domain == "ground" and model.turn_radius == 0:
+            assert model.clearance >= (model.length**2 + model.width**2) ** 0.5 / 2, name

@@ -84,7 +84,7 @@ def install(folder: Path, pyproject: dict[str, Any]) -> None:
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.stem)
 def test_a_page_runs_and_prints_what_it_quotes(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every command, in order, ends with the status told (else 0); every quoted line is in what was said since the last."""
-    if page.stem not in ("export", "triage"):
+    if page.stem != "export":
         pytest.importorskip("pybullet", reason="PyBullet has wheels for Linux and CPython 3.11 only")
     if page.stem == "cluster":
         pytest.importorskip("distributed", reason="Dask is absent (extra `cluster`)")
