@@ -196,7 +196,7 @@ def guide_multirotors(
             if t.reach >= length:
                 if _stops(t, table, time):
                     t.reach, t.pace = length, 0.0
-                    if gap < 0.5 and abs(t.aside) < 0.2 * lim.length:  # back on its path
+                    if gap < 0.5 and (length == 0.0 or abs(t.aside) < 0.2 * lim.length):  # back on its path
                         _arrive(t, table, time)
                 else:
                     t.reach -= length
