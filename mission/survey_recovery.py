@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from shapely import LineString, MultiLineString, MultiPolygon, Point
 
-from quarterdeck.coverage.metrics import track_length
+from quarterdeck.coverage.metrics import swath, track_length
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Area, Scenario, Site, Vehicle, as_multipolygon
 from quarterdeck.geo.transit import Roadmap
@@ -47,8 +47,10 @@ def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, ch
     done = with_surveyed(mission, progress.tracks)
     driven = _swath([*(np.array(line.coords) for line in done), *ahead], spacing)
     site = scenario.site.coverable
-    gaps = as_multipolygon(_swath(left, spacing).intersection(site).difference(driven))
-    rim = as_multipolygon(_swath(cut, spacing).intersection(site).difference(driven).difference(gaps))
+    missed = shapely.difference(site, driven, grid_size=1e-6 * spacing)
+    gaps = as_multipolygon(shapely.intersection(_swath(left, spacing), missed, grid_size=1e-6 * spacing))
+    beyond = shapely.difference(missed, gaps, grid_size=1e-6 * spacing)
+    rim = as_multipolygon(shapely.intersection(_swath(cut, spacing), beyond, grid_size=1e-6 * spacing))
     told = [Reason(f"{gaps.area:.6g} m2 can no longer be covered: {_why(survey.left)}")] if left else []
     return replace(
         mission,
@@ -56,7 +58,7 @@ def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, ch
         vehicles=scenario.vehicles,
         routes=survey.routes,
         figures={
-            "poc": driven.intersection(site).area / site.area if site.area else 1.0,
+            "poc": 1.0 - missed.area / site.area if site.area else 1.0,
             "length": sum(track_length(t) for t in ahead),
             "makespan": max(r.duration for r in survey.routes),
             "energy": sum(r.energy for r in survey.routes),
@@ -73,9 +75,13 @@ def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, ch
 
 
 def _swath(tracks: Sequence[np.ndarray], spacing: float) -> shapely.Geometry:
-    """Return what is within half the spacing of (n, 2) tracks. One buffer of all: a tenth of the time of their union."""
-    lines = [LineString(t) for t in tracks if len(t) > 1]
-    return shapely.buffer(MultiLineString(lines), spacing / 2, quad_segs=16)
+    """Return what is within half the spacing of (n, 2) tracks.
+
+    One buffer of all takes a tenth of the time of their union, but GEOS makes some that cross themselves.
+    """
+    lines = [t for t in tracks if len(t) > 1]
+    wide = shapely.buffer(MultiLineString([LineString(t) for t in lines]), spacing / 2, quad_segs=16)
+    return wide if wide.is_valid else swath(lines, spacing)
 
 
 def _why(left: Sequence[Line]) -> str:
