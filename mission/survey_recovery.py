@@ -47,11 +47,11 @@ def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, ch
     done = with_surveyed(mission, progress.tracks)
     driven = _swath([*(np.array(line.coords) for line in done), *ahead], spacing)
     site = scenario.site.coverable
-    missed = shapely.difference(site, driven, grid_size=1e-6 * spacing)
+    missed = as_multipolygon(shapely.difference(site, driven, grid_size=1e-6 * spacing))
     gaps = as_multipolygon(shapely.intersection(_swath(left, spacing), missed, grid_size=1e-6 * spacing))
-    beyond = shapely.difference(missed, gaps, grid_size=1e-6 * spacing)
+    beyond = as_multipolygon(shapely.difference(missed, gaps, grid_size=1e-6 * spacing))
     rim = as_multipolygon(shapely.intersection(_swath(cut, spacing), beyond, grid_size=1e-6 * spacing))
-    told = [Reason(f"{gaps.area:.6g} m2 can no longer be covered: {_why(survey.left)}")] if left else []
+    told = [Reason(f"{gaps.area:.6g} m2 can no longer be covered: {_why(survey.left)}")] if gaps.area > 0 else []
     return replace(
         mission,
         site=scenario.site,
