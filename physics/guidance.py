@@ -149,7 +149,7 @@ def guide_rovers(
             wanted = min(wanted, max(np.sqrt(2 * 0.7 * lim.accel * max(length - along - near, 0.0)), 0.05))
         ahead = max(0.5 * lim.length, 0.8 * abs(velocity[i]))
         bearing = _wrap(np.arctan2(ty * ahead - tx * cross, tx * ahead + ty * cross) - psi + t.bias)
-        if abs(bearing) > (1.0 if t.slow > 0.0 else 0.03):  # pushed off its path, or held: face it first
+        if abs(bearing) > (1.0 if t.slow > 0.0 else 0.1):  # pushed off its path, or held: face it first
             turn[i] = min(max(2.0 * bearing, -lim.rate), lim.rate)
             continue
         speed[i] = wanted

@@ -10,8 +10,8 @@ from numba import njit
 
 HORIZON = 20.0  # s
 MEET = 0.6  # of the distance kept: how far each of two goes aside that meet head-on
-PASS = 1.15  # berths off one passes it
-BERTH = 0.5  # of the distance kept: how near one may pass what lies still; less than routes keep from wrecks
+PASS = 1.25  # berths off one passes it
+BERTH = 0.45  # of the distance kept: how near one may pass what lies still; less than routes keep from wrecks
 WIDE = 0.8  # of the distance kept: how near one may pass what stands and wants to go on
 
 
