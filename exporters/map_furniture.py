@@ -35,7 +35,7 @@ def graticule(chart: Axes, frame: Frame) -> None:
     lon0, lon1, lat0, lat1 = lons.min(), lons.max(), degrees[:, 1].min(), degrees[:, 1].max()
     chart.set_xticks([])
     chart.set_yticks([])
-    frame_box, dots = chart.get_window_extent(), chart.get_figure(root=True).dpi / 72  # type: ignore[union-attr]
+    frame_box, dots = chart.get_window_extent(), chart.figure.dpi / 72
     for low, high, across, first in ((lon0, lon1, (lat0, lat1), 0), (lat0, lat1, (lon0, lon1), 1)):
         start, end = (west, east) if first == 0 else (south, north)
         room = (frame_box.width if first == 0 else frame_box.height) / dots  # points

@@ -62,7 +62,7 @@ def test_views_from_vertices_and_edges_are_the_limits_of_views_beside(seed: int)
         for at in (a, (a + b) / 2):
             view = visibility_polygons(mesh, at, 5.0)[0]
             around = shapely.distance(shapes, shapely.Point(at)) < 1e-9
-            beside = at + 1e-7 * (mesh.vertices[mesh.triangles[around]].mean(axis=1) - at)
+            beside = at + 1e-9 * (mesh.vertices[mesh.triangles[around]].mean(axis=1) - at)
             assert view.symmetric_difference(shapely.union_all(visibility_polygons(mesh, beside, 5.0))).area < 1e-4
 
 
