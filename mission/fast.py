@@ -11,12 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.director import Command, Director, Event, State, wake_time
 from quarterdeck.mission.lateness import done
 from quarterdeck.mission.mission import Mission, Route, Waypoint
 from quarterdeck.mission.progress import surveyed
-from quarterdeck.mission.timing import timed_route
+from quarterdeck.mission.timing import commanded_route
 from quarterdeck.mission.world import Actor, Fault, run_world
 
 
@@ -111,7 +110,9 @@ def _as_planned(director: Director, mission: Mission) -> Director:
         waiting = {**known.waiting, **commands}
         sent = {v: c for v, c in waiting.items() if v not in mute and states[v].alive}
         before = replace(known, states=states)
-        timed = {v: _timed(vehicles[v], states[v], c) for v, c in sent.items()}
+        timed = {
+            v: commanded_route(vehicles[v], (states[v].x, states[v].y, states[v].z), c.waypoints) for v, c in sent.items()
+        }
         return {v: _paced(route) for v, route in timed.items()}, _Legs(
             inner,
             wake_time(inner),
@@ -136,15 +137,6 @@ def _flown(known: _Legs, vehicle: str, state: State) -> State:
     here = replace(state, z=route.waypoints[min(state.reached, len(route.waypoints) - 1)].z)
     part = done(route, here) / route.duration if route.duration else 1.0
     return replace(here, energy_used=known.used[vehicle] + part * route.energy)
-
-
-def _timed(vehicle: Vehicle, state: State, command: Command) -> Route:
-    """Return a command as a route from where the vehicle is, with the times and energy that plans reckon with."""
-    ways = command.waypoints
-    points = np.array([(state.x, state.y, state.z), *((w.x, w.y, w.z) for w in ways)])
-    pace = [1.0, *((w.speed or vehicle.speed) / vehicle.speed for w in ways)]
-    holds, legs = [0.0, *(w.hold for w in ways)], ["start", *(w.leg for w in ways)]
-    return timed_route(vehicle, points, legs, pace=pace, holds=holds, tasks=[None, *(w.task for w in ways)])
 
 
 def _paced(route: Route) -> Command:

@@ -9,7 +9,7 @@ import numpy as np
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.director import State
 from quarterdeck.mission.mission import Route, Waypoint
-from quarterdeck.mission.timing import timed_route
+from quarterdeck.mission.timing import commanded_route
 
 WINDOW = 20.0  # s between looks
 WINDOWS = 3  # looks in a row: giving way, gusts and noise are over sooner
@@ -37,10 +37,7 @@ class Course:
 
 def course(vehicle: Vehicle, state: State, waypoints: tuple[Waypoint, ...], time: float) -> Course:
     """Return the course of a vehicle that at `time` is told to go along `waypoints` from where it is."""
-    points = np.array([(state.x, state.y, state.z), *((w.x, w.y, w.z) for w in waypoints)])
-    pace = [1.0, *((w.speed or vehicle.speed) / vehicle.speed for w in waypoints)]
-    holds = [0.0, *(w.hold for w in waypoints)]
-    return Course(timed_route(vehicle, points, ["start", *(w.leg for w in waypoints)], pace=pace, holds=holds), time)
+    return Course(commanded_route(vehicle, (state.x, state.y, state.z), waypoints), time)
 
 
 def looked(course: Course, vehicle: Vehicle, state: State, time: float) -> Course:

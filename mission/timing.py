@@ -50,6 +50,18 @@ def timed_route(
     return Route(vehicle.id, tuple(waypoints), energy / 3600.0)
 
 
+def commanded_route(vehicle: Vehicle, place: tuple[float, float, float], waypoints: Sequence[Waypoint]) -> Route:
+    """Return commanded waypoints as a route from `place`, (x, y, z) metres, with the times and energy of `timed_route`."""
+    return timed_route(
+        vehicle,
+        np.array([place, *((w.x, w.y, w.z) for w in waypoints)]),
+        ["start", *(w.leg for w in waypoints)],
+        pace=[1.0, *((w.speed or vehicle.speed) / vehicle.speed for w in waypoints)],
+        holds=[0.0, *(w.hold for w in waypoints)],
+        tasks=[None, *(w.task for w in waypoints)],
+    )
+
+
 def turn_times(vehicle: Vehicle, points: np.ndarray) -> np.ndarray:
     """Return (n,) seconds lost in the turn at each of (n, 2 or 3) points; none at the ends.
 
