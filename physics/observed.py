@@ -19,8 +19,9 @@ from quarterdeck.mission.tracks import Record
 from quarterdeck.mission.triage.plan import METHOD, run_plan, scenario_of
 from quarterdeck.mission.triage.sight import seen_by
 from quarterdeck.mission.triage.team import field_of
+from quarterdeck.physics.measure import measure
 from quarterdeck.physics.paths import LEGS, vehicle_limits
-from quarterdeck.physics.report import Report, measure
+from quarterdeck.physics.report import Report
 from quarterdeck.physics.seen import unseen, whole_tracks
 from quarterdeck.physics.simulate import LATE, Run
 from quarterdeck.physics.swath import TOLERANCE, driven_tracks

@@ -22,7 +22,8 @@ from quarterdeck.mission.told import as_told
 from quarterdeck.mission.triage.plan import METHOD, run_plan
 from quarterdeck.physics.faults import in_fast_world, read_faults
 from quarterdeck.physics.mapping import agreement
-from quarterdeck.physics.report import Report, check_limits, measure
+from quarterdeck.physics.measure import measure
+from quarterdeck.physics.report import Report, check_limits
 from quarterdeck.physics.running import DECIDE, Running
 from quarterdeck.physics.sensing import Sensing
 from quarterdeck.physics.terrain import check_terrain
