@@ -262,8 +262,7 @@ def _telling(now: _Memory, time: float, state: State, route: Route, plan: Missio
     if route.vehicle in now.untried:
         reached = 1
     elif plan.method == "assign":  # its commands are parts of the route
-        done = [i + 1 for i, w in enumerate(had.waypoints) if w.task and now.served.get(w.task) == route.vehicle]
-        reached = max(passed(had, place, time - now.since), *done, 1)
+        reached = passed(had, now.sent.get(route.vehicle, ()), state.reached)
     else:
         reached = min(state.reached + 1, len(had.waypoints))
     return Telling(time, route, place, reached, state.energy_used, plan.guards)

@@ -4,11 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import dist
 
-import numpy as np
-
 from quarterdeck.mission.mission import Guard, Mission, Route, Waypoint
-
-SAME = 0.5  # m: legs so much farther away than the nearest may be the one that a vehicle is on
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,20 +23,18 @@ class Telling:
     guards: tuple[Guard, ...] = ()
 
 
-def passed(route: Route, place: tuple[float, float, float], time: float) -> int:
-    """Return how many waypoints of a route a vehicle has passed that is at `place`, on the leg that is nearest to it.
+def passed(route: Route, way: Sequence[Waypoint], reached: int) -> int:
+    """Return how many waypoints of a route are passed by who has come by `reached` of a command's `way`.
 
-    Of several it is on that which it is to be on nearest to `time`, seconds of the route.
+    The way is a part of the route; it may come to a place, and serve there, by two waypoints. The start is always passed.
     """
-    points = route.xyz
-    if len(points) < 2:
-        return len(points)
-    step, off = np.diff(points, axis=0), np.array(place) - points[:-1]
-    part = np.clip((off * step).sum(axis=1) / np.maximum((step**2).sum(axis=1), 1e-12), 0.0, 1.0)
-    away = np.linalg.norm(off - part[:, None] * step, axis=1)
-    leave, come = (np.array([w.time for w in ws]) for ws in (route.waypoints[:-1], route.waypoints[1:]))
-    late = np.abs(leave + part * (come - leave) - time)
-    return 1 + int(np.argmin(np.where(away <= away.min() + SAME, late, np.inf)))
+    places, goals = ([(w.x, w.y, w.z) for w in ws] for ws in (route.waypoints, way))
+    last, end = ([i for i, p in enumerate(ps) if ps[i + 1 : i + 2] != [p]] for ps in (places, goals))  # of each place
+    ahead, behind = [goals[i] for i in end], sum(i < reached for i in end)
+    for first in range(len(last)):
+        if [places[i] for i in last[first : first + len(ahead)]] == ahead and first + behind:
+            return last[first + behind - 1] + 1
+    return 1
 
 
 def as_told(mission: Mission, told: Sequence[Telling]) -> Mission:

@@ -7,6 +7,11 @@ from datetime import UTC, datetime
 import gpxpy.gpx
 import pytest
 from fuzzing.autopilot_logs import dataflash, telemetry
+from hypothesis import settings
+
+# The same cases in each run; `--hypothesis-profile=default` draws new ones.
+settings.register_profile("same", derandomize=True)
+settings.load_profile("same")
 
 
 def pytest_addoption(parser):
