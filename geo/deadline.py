@@ -1,8 +1,10 @@
 """When searches and runs have to end: at a time limit, or when Ctrl-C asks for it. They keep what they have."""
 
+import math
 import signal
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -26,26 +28,32 @@ _LIMIT: ContextVar[Limit | None] = ContextVar("limit", default=None)
 
 
 @contextmanager
-def limited(seconds: float | None = None, *, interruptible: bool = False) -> Iterator[Limit]:
-    """Have searches and runs within end after `seconds`; where `interruptible`, at the first Ctrl-C too.
+def limited(seconds: float | None = None, *, interruptible: Callable[[], None] | None = None) -> Iterator[Limit]:
+    """Have searches and runs within end after `seconds`, and when what is around them has to end.
 
+    With `interruptible` at the first Ctrl-C too (in the main thread, which alone hears it), when it is called to say so.
     What cannot be cut, since there would be no result without it, still takes its time; a second Ctrl-C ends it.
-    `interruptible` is for the main thread of a program.
     """
-    limit = Limit(time.monotonic() + (float("inf") if seconds is None else seconds))
+    limit = _LIMIT.get() or Limit(math.inf)
+    ended = limit.ends
+    limit.ends = min(ended, time.monotonic() + (math.inf if seconds is None else seconds))
     token = _LIMIT.set(limit)
 
     def stop(*_: object) -> None:
         if limit.interrupted:
             raise KeyboardInterrupt
         limit.interrupted = True
+        if interruptible:
+            interruptible()
 
-    before = signal.signal(signal.SIGINT, stop) if interruptible else None
+    hears = interruptible is not None and threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGINT, stop) if hears else None
     try:
         yield limit
     finally:
-        if interruptible:
+        if hears:
             signal.signal(signal.SIGINT, before)
+        limit.ends = ended
         _LIMIT.reset(token)
 
 

@@ -22,7 +22,7 @@ def visibility_polygons(
     The disc is an inscribed regular polygon, so that each is truly seen; with `outer` a circumscribed one, so that nothing
     that is seen is missing. A point in no triangle sees nothing: an empty polygon.
     """
-    points = np.asarray(points, dtype=float).reshape(-1, 2)
+    points = np.ascontiguousarray(points, dtype=float).reshape(-1, 2)
     ranges = np.full(len(points), ranges, dtype=float)
     reach = ranges / np.cos(np.pi / DISC_SIDES) if outer else ranges
     coordinates, sizes = _outlines(mesh.vertices, mesh.triangles, mesh.neighbours, points, reach)
@@ -47,8 +47,8 @@ def visible_points(
 
     Indices ascend within a row. Points in no triangle are never seen.
     """
-    origins = np.asarray(origins, dtype=float).reshape(-1, 2)
-    points = np.asarray(points, dtype=float).reshape(-1, 2)
+    origins = np.ascontiguousarray(origins, dtype=float).reshape(-1, 2)
+    points = np.ascontiguousarray(points, dtype=float).reshape(-1, 2)
     ranges = np.full(len(origins), ranges, dtype=float)
     home = _locate_all(mesh.vertices, mesh.triangles, points)
     order = np.argsort(home, kind="stable")
@@ -61,7 +61,7 @@ def visible_vertices(mesh: Triangulation, origins: np.ndarray) -> tuple[np.ndarr
 
     What is behind another vertex, in line with it, counts as seen unless a wall lies between.
     """
-    origins = np.asarray(origins, dtype=float).reshape(-1, 2)
+    origins = np.ascontiguousarray(origins, dtype=float).reshape(-1, 2)
     return _visible_vertices(mesh.vertices, mesh.triangles, mesh.neighbours, origins)
 
 

@@ -69,14 +69,14 @@ def _planner(method: str) -> Callable[..., Mission]:
 
 def within(time_limit: float | None, make: Callable[[], Mission]) -> Mission:
     """Return the mission that `make` makes, its searches ended after `time_limit` seconds: its header tells the limit and
-    which searches it cut short.
+    which searches it, or Ctrl-C, cut short.
     """
     with limited(time_limit) as limit:
         mission = make()
-    if time_limit is None:
-        return mission
-    parameters = {**mission.parameters, "time_limit": time_limit}
-    return replace(mission, parameters=parameters, figures={**mission.figures, "cut": limit.cut})
+    told: dict[str, Any] = {"cut": limit.cut} if limit.cut or time_limit is not None else {}
+    told |= {"stopped": limit.cause} if limit.interrupted else {}
+    parameters = {**mission.parameters, **({} if time_limit is None else {"time_limit": time_limit})}
+    return replace(mission, parameters=parameters, figures={**mission.figures, **told})
 
 
 def _at_height(mission: Mission, terrain: Terrain | None = None, tolerance: float = 5.0) -> Mission:

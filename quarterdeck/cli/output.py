@@ -1,7 +1,9 @@
 """Where results and tables go: results to a file or standard output, tables and progress to standard error."""
 
+import os
 import sys
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +37,12 @@ time_limit_option = click.option(
     type=Real(min=0, min_open=True),
     help="End searches and runs after so long, with what there is by then; told. Seeds then promise nothing.",
 )
+
+
+def tell_stopping() -> None:
+    """Tell whoever pressed Ctrl-C what comes of it."""
+    with suppress(OSError):  # standard error may be closed
+        os.write(2, b"\nending with what there is; Ctrl-C once more leaves it\n")  # no stream: it may be writing just now
 
 
 def emit(content: str | bytes, output: str, *, force: bool) -> None:
@@ -133,9 +141,10 @@ def print_figures(mission: Mission) -> None:
 
 
 def print_cut(mission: Mission) -> None:
-    """Print what a time limit has cut short."""
+    """Print what a time limit, or Ctrl-C, has cut short."""
     if cut := mission.figures.get("cut"):
-        print_reason(console(), "cut short by --time-limit", ", ".join(cut))
+        by = "Ctrl-C" if mission.figures.get("stopped") == "interrupted" else "--time-limit"
+        print_reason(console(), f"cut short by {by}", ", ".join(cut))
 
 
 WORDS = {

@@ -14,6 +14,7 @@ from quarterdeck.cli.output import (
     print_figures,
     seed_option,
     tell_compiling,
+    tell_stopping,
     terrain_option,
     time_limit_option,
     tolerance_option,
@@ -73,9 +74,13 @@ def command(
     force: bool,
     **options: Any,
 ) -> int:
-    """Plan a mission that covers the areas of SITE, a GeoJSON file (- reads standard input), and write it as a PLAN."""
+    """Plan a mission that covers the areas of SITE, a GeoJSON file (- reads standard input), and write it as a PLAN.
+
+    Ctrl-C ends the searches and writes what there is; a second one ends at once, with nothing.
+    """
     from quarterdeck.api import default_method, plan, plan_text, read_scenario
     from quarterdeck.cli.advice import far_off, print_notes
+    from quarterdeck.geo.deadline import limited
     from quarterdeck.geo.geojson import opened
 
     tell_compiling()
@@ -93,7 +98,10 @@ def command(
     if "entry" in given:
         given["entry"] = _entry(given["entry"], scenario.frame)
     ground = _terrain(terrain, scenario) if terrain else None
-    mission = plan(scenario, method=method, seed=seed, terrain=ground, tolerance=tolerance, time_limit=time_limit, **given)
+    with limited(interruptible=tell_stopping) as limit:
+        mission = plan(
+            scenario, method=method, seed=seed, terrain=ground, tolerance=tolerance, time_limit=time_limit, **given
+        )
     text = plan_text(mission)
     emit(text, output, force=force)
     if as_json:
@@ -101,6 +109,8 @@ def command(
         click.echo(json.dumps({k: header[k] for k in ("feasible", "reasons", "figures", "bounds")}), err=True)
     else:
         print_figures(mission)
+    if limit.interrupted:
+        return 130
     return 0 if mission.feasible else 1
 
 

@@ -17,6 +17,7 @@ from quarterdeck.cli.output import (
     print_figures,
     print_reason,
     tell_compiling,
+    tell_stopping,
     time_limit_option,
 )
 from quarterdeck.cli.parameters import Real
@@ -60,8 +61,12 @@ def command(
     time_limit: float | None,
     force: bool,
 ) -> int:
-    """Write the mission of PLAN from now on: what is done stays done, survivors go on from where they are and come home."""
+    """Write the mission of PLAN from now on: what is done stays done, survivors go on from where they are and come home.
+
+    Ctrl-C ends the searches and writes what there is; a second one ends at once, with nothing.
+    """
     from quarterdeck.api import within
+    from quarterdeck.geo.deadline import limited
     from quarterdeck.mission.changes import check_changes, read_changes
     from quarterdeck.mission.planfile import plan_text, read_plan
     from quarterdeck.mission.replan import replan
@@ -74,9 +79,12 @@ def command(
     check_changes(mission, changes)
     stopped = {v: changes.since.get(v, math.inf) for v in changes.lost}
     so_far = _progress(mission, time, tracks, start, state, stopped)
-    after = within(time_limit, lambda: replan(mission, so_far, changes, seed=seed))
+    with limited(interruptible=tell_stopping) as limit:
+        after = within(time_limit, lambda: replan(mission, so_far, changes, seed=seed))
     emit(plan_text(after), output, force=force)
     print_figures(after)
+    if limit.interrupted:
+        return 130
     return 0 if after.feasible else 1
 
 

@@ -19,6 +19,7 @@ from quarterdeck.cli.output import (
     minutes,
     seed_option,
     tell_compiling,
+    tell_stopping,
     time_limit_option,
 )
 from quarterdeck.cli.parameters import Choice, Real
@@ -158,7 +159,7 @@ def command(
     if options["changes"] and not options["recover"]:
         raise InputError("--changes needs --recover: without it nobody replans")
     tell_compiling()
-    with limited(time_limit, interruptible=True) as limit:
+    with limited(time_limit, interruptible=tell_stopping) as limit:
         mission, run = execute(**options, casualties=bool(snapshots or casualties))
     if run.map is not None:
         from quarterdeck.geo.occupancy import write_map

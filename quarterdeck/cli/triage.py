@@ -18,6 +18,7 @@ from quarterdeck.cli.output import (
     print_reason,
     seed_option,
     tell_compiling,
+    tell_stopping,
     time_limit_option,
 )
 from quarterdeck.cli.parameters import Choice, Real
@@ -154,7 +155,7 @@ def _run(scenario: Scenario, settings: Settings, seed: int, output: str, force: 
 
     faults = [Fault(who, when) for who, when in options["fails"]]
     methods = METHODS if options["compare"] else (options["method"],)
-    with limited(options["time_limit"]):
+    with limited(options["time_limit"], interruptible=tell_stopping) as limit:
         outcomes = {m: run_triage(scenario, m, settings, seed=seed, faults=faults) for m in methods}
     outcome = outcomes[options["method"]]
     files: list[tuple[str | None, Any]] = [
@@ -174,6 +175,8 @@ def _run(scenario: Scenario, settings: Settings, seed: int, output: str, force: 
         click.echo(json.dumps({m: _plain(o) for m, o in outcomes.items()}), err=True)
     else:
         _print(outcomes)
+    if limit.interrupted:
+        return 130
     return 1 if outcome.reasons else 0
 
 

@@ -32,13 +32,29 @@ def test_a_limit_that_is_not_reached_cuts_nothing():
     assert limit.cut == []
 
 
+def test_a_limit_within_another_ends_with_it_and_is_gone_after():
+    """The nearer of both ends counts; what is around goes on until its own."""
+    with limited(3600.0) as outer:
+        with limited(1e-9) as inner:
+            assert time_is_up("one")
+        assert not time_is_up("other")
+        with limited(7200.0):
+            assert not time_is_up("other")
+    assert inner.cut == outer.cut == ["one"]
+    with limited(1e-9), limited(3600.0):
+        assert time_is_up("one")
+
+
 @pytest.mark.usefixtures("hears_ctrl_c")
 def test_the_first_interrupt_ends_searches_and_the_second_everything():
     """A real SIGINT is noted, the next one raises; then Python's own handler stands again."""
-    with limited(interruptible=True) as limit:
+    said = []
+    with limited(interruptible=lambda: said.append("ending")) as limit:
         assert not time_is_up("one")
         os.kill(os.getpid(), signal.SIGINT)
-        assert time_is_up("one")
+        assert said == ["ending"]
+        with limited(3600.0):
+            assert time_is_up("one")
         assert limit.interrupted
         assert cause() == "interrupted"
         with pytest.raises(KeyboardInterrupt):

@@ -21,7 +21,8 @@ calls, own = [], {holder}.{name}
 def counted(*args, **options):
     calls.append(1)
     if len(calls) == {count}:
-        os.kill(os.getpid(), signal.{sent})
+        for _ in range({times}):
+            os.kill(os.getpid(), signal.{sent})
     return own(*args, **options)
 {holder}.{name} = counted
 from quarterdeck.cli import main
@@ -29,9 +30,9 @@ main(sys.argv[1:])
 """
 
 
-def interrupted(module, holder, name, count, *arguments, sent="SIGINT"):
+def interrupted(module, holder, name, count, *arguments, sent="SIGINT", times=1):
     """Run the command line in a process that gets a real signal at the n-th call of a function; return how it ended."""
-    code = STOPPED.format(module=module, holder=holder, name=name, count=count, sent=sent)
+    code = STOPPED.format(module=module, holder=holder, name=name, count=count, sent=sent, times=times)
     command = [sys.executable, "-c", code, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
@@ -120,13 +121,42 @@ def test_an_interrupted_assignment_is_the_best_so_far(tmp_path):
     assert read_plan(path).figures["stopped"] == "interrupted"
 
 
-def test_an_interrupted_plan_leaves_nothing(tmp_path):
-    """Ctrl-C in a plan: one line, 130, no file."""
+def test_an_interrupted_plan_is_what_there_is(tmp_path):
+    """Ctrl-C in a plan's searches: it is said at once, the plan is whole and says what was cut, and its replan likewise."""
+    path, site = tmp_path / "plan.geojson", DATA / "west_ant_island.geojson"
+    done = interrupted("quarterdeck.coverage", "placement", "index", 5, "plan", site, "--spacing", "100", "-o", path)
+    assert done.returncode == 130, done.stderr
+    assert "ending with what there is" in done.stderr
+    assert "cut short by Ctrl-C: the placement of the grid" in done.stderr
+    mission = read_plan(path)
+    assert mission.figures["stopped"] == "interrupted"
+    assert mission.figures["poc"] > 0.9
+    after = tmp_path / "after.geojson"
+    lost = ["replan", path, "--at", "900", "--lost", mission.vehicles[0].id, "-o", after]
+    done = interrupted("quarterdeck.mission", "replan", "replan", 1, *lost)
+    assert done.returncode == 130, done.stderr
+    assert read_plan(after).figures["stopped"] == "interrupted"
+
+
+def test_a_plan_interrupted_twice_leaves_nothing(tmp_path):
+    """The second Ctrl-C ends at once: 130, no file."""
     path, site = tmp_path / "plan.geojson", DATA / "dalian_harbour.geojson"
-    done = interrupted("quarterdeck.coverage", "placement", "index", 5, "plan", site, "--spacing", "80", "-o", path)
+    options = ["plan", site, "--spacing", "80", "-o", path]
+    done = interrupted("quarterdeck.coverage", "placement", "index", 5, *options, times=2)
     assert done.returncode == 130
-    assert done.stderr.strip() == "quarterdeck: interrupted"
+    assert done.stderr.splitlines()[-1] == "quarterdeck: interrupted"
     assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupted_drill_is_told_so_far(tmp_path):
+    """Ctrl-C in triage: the outcome is written and says why it ends there."""
+    out = tmp_path / "out.geojson"
+    done = interrupted(
+        "quarterdeck.mission.triage", "outcome", "run_triage", 1, "triage", DATA / "triage_drill.geojson", "-o", out
+    )
+    assert done.returncode == 130, done.stderr
+    assert "(interrupted)" in done.stderr
+    assert out.exists()
 
 
 @pytest.mark.parametrize("sent", ["SIGINT", "SIGTERM", "SIGKILL"])
