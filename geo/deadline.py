@@ -67,6 +67,12 @@ def time_is_up(what: str) -> bool:
     return True
 
 
+def time_left() -> float | None:
+    """Return the seconds until the limit, for what waits; None where there is none."""
+    limit = _LIMIT.get()
+    return None if limit is None or limit.ends == math.inf else max(0.0, limit.ends - time.monotonic())
+
+
 def cause() -> str:
     """Return why the time is up: `interrupted` or `time limit`; nothing where there is no limit."""
     limit = _LIMIT.get()

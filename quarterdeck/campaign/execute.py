@@ -7,13 +7,16 @@ from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from multiprocessing import get_context
 from typing import Any
 
 from quarterdeck.campaign.kind import Case
+from quarterdeck.geo.deadline import time_is_up, time_left
 from quarterdeck.geo.errors import InputError, UnavailableError
 from quarterdeck.geo.version import VERSION
 
+RUNS = "the runs"  # what a time limit cuts
 TRIES = 3  # times that a case may take its worker down before it is given up
 
 
@@ -32,7 +35,7 @@ def run_case(text: str, case: Case, limits: dict[str, float]) -> dict[str, Any]:
 
 def over_processes(text: str, todo: list[Case], limits: dict[str, float], jobs: int) -> Iterator[dict[str, Any]]:
     """Yield rows as runs are done, `jobs` processes at work. A process that dies takes down the runs in flight alone: they
-    are tried again, and given up after TRIES.
+    are tried again, and given up after TRIES. At the time limit those in flight are ended and no more are begun.
     """
     waiting, fallen = list(reversed(todo)), Counter[int]()
     while waiting:
@@ -48,7 +51,7 @@ def over_processes(text: str, todo: list[Case], limits: dict[str, float], jobs: 
                         except BrokenProcessPool:
                             waiting.append(case)
                             broken = True
-                    for future in wait(flying, return_when=FIRST_COMPLETED).done if flying else ():
+                    for future in wait(flying, time_left(), FIRST_COMPLETED).done if flying else ():
                         try:
                             row = future.result()
                         except BrokenProcessPool:
@@ -56,11 +59,11 @@ def over_processes(text: str, todo: list[Case], limits: dict[str, float], jobs: 
                             continue
                         del flying[future]
                         yield row
+                    if time_is_up(RUNS):
+                        _end(pool)
+                        return
             except (KeyboardInterrupt, GeneratorExit):
-                processes = list((pool._processes or {}).values())
-                pool.shutdown(wait=False, cancel_futures=True)
-                for process in processes:
-                    process.terminate()
+                _end(pool)
                 raise
         for case in flying.values():
             fallen[case.number] += 1
@@ -70,9 +73,18 @@ def over_processes(text: str, todo: list[Case], limits: dict[str, float], jobs: 
                 yield _given_up(case)
 
 
+def _end(pool: ProcessPoolExecutor) -> None:
+    """End the processes of a pool, in the midst of what they do."""
+    processes = list((pool._processes or {}).values())
+    pool.shutdown(wait=False, cancel_futures=True)
+    for process in processes:
+        process.terminate()
+
+
 def over_cluster(text: str, todo: list[Case], limits: dict[str, float], address: str) -> Iterator[dict[str, Any]]:
     """Yield rows as runs are done on the Dask cluster whose scheduler is at `address`; workers may come, go and die.
 
+    At the time limit those in flight are given up and no more are begun.
     Raises UnavailableError where Dask is absent, InputError if nobody answers at the address.
     """
     try:
@@ -101,17 +113,22 @@ def over_cluster(text: str, todo: list[Case], limits: dict[str, float], address:
 
         # A few more than there are hands for, so that none waits; workers that join later are given work as it goes.
         hands = 2 * sum(client.nthreads().values()) + 2
-        flying = as_completed([submit() for _ in range(min(len(waiting), hands))], loop=client.loop)
-        for future in flying:
-            try:
-                row = future.result()
-            except KilledWorker:
-                row = _given_up(future.case)
-            except CancelledError:
-                raise InputError(f"the Dask scheduler at {address} went away; start it and call again to go on") from None
-            yield row
-            if waiting:
-                flying.add(submit())
+        flying = as_completed([submit() for _ in range(min(len(waiting), hands))], loop=client.loop, timeout=time_left())
+        with suppress(TimeoutError):
+            for future in flying:
+                try:
+                    row = future.result()
+                except KilledWorker:
+                    row = _given_up(future.case)
+                except CancelledError:
+                    raise InputError(
+                        f"the Dask scheduler at {address} went away; start it and call again to go on"
+                    ) from None
+                yield row
+                if time_is_up(RUNS):
+                    return
+                if waiting:
+                    flying.add(submit())
 
 
 def _version() -> str:

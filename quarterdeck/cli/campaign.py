@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from quarterdeck.cli.files import takes
-from quarterdeck.cli.output import console, force_option, print_reason
+from quarterdeck.cli.output import console, force_option, print_reason, time_limit_option
 from quarterdeck.cli.parameters import Real
 
 if TYPE_CHECKING:
@@ -35,6 +35,7 @@ MOST_MEANS = 12  # combinations whose means are printed; those of more are in su
     "--worst", type=click.IntRange(min=0), default=5, show_default=True, help="How many of the worst runs to tell."
 )
 @click.option("--least", type=Real(0, 1), help="Exit with 1 if the probability of success may be less (95 % confidence).")
+@time_limit_option
 @click.option("--json", "as_json", is_flag=True, help="Write the summary as JSON to standard output.")
 @force_option
 def command(
@@ -44,18 +45,20 @@ def command(
     scheduler: str | None,
     worst: int,
     least: float | None,
+    time_limit: float | None,
     as_json: bool,
     force: bool,
 ) -> int:
     """Run what STUDY, a TOML file, asks for (see docs/campaign.md), and tell the probability of success.
 
-    What is done is kept in the results' folder: called again after an interruption, it goes on from there. --force starts
-    anew.
+    What is done is kept in the results' folder: called again after an interruption or its time limit, it goes on from
+    there. --force starts anew.
     """
     from quarterdeck.campaign.execute import over_cluster, over_processes
     from quarterdeck.campaign.journal import Journal
     from quarterdeck.campaign.study import cases, read_study
     from quarterdeck.campaign.summary import as_csv, as_parquet, summarise
+    from quarterdeck.geo.deadline import limited
     from quarterdeck.geo.files import write_file
 
     if scheduler and jobs:
@@ -63,7 +66,7 @@ def command(
     asked = read_study(Path(study))
     every = list(cases(asked))
     folder = output or Path(study).with_suffix(".runs")
-    with Journal(folder, asked.hash, force=force) as journal:
+    with limited(time_limit), Journal(folder, asked.hash, force=force) as journal:
         todo = [case for case in every if case.number not in journal.rows]
         limits = dict(asked.limits)
         rows = (
@@ -83,6 +86,9 @@ def command(
     if as_json:
         click.echo(text, nl=False)
     _print(summary, folder, parquet is not None)
+    if len(journal.rows) < len(every):
+        done = f"{len(journal.rows):,} of {len(every):,} runs are done; the same command goes on from there"
+        print_reason(console(), "cut short by --time-limit", done)
     return 1 if least is not None and summary["low"] < least else 0
 
 

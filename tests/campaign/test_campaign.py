@@ -91,6 +91,18 @@ def test_a_killed_campaign_goes_on_where_it_was(study: Writer, whole: Path, tmp_
     assert (folder / "runs.csv").read_bytes() == (whole / "runs.csv").read_bytes()
 
 
+def test_a_time_limit_ends_a_campaign_that_goes_on_later(study: Writer, whole: Path, tmp_path: Path, capfd) -> None:
+    """What is done by then is summed up, the rest is told, and done by the next call."""
+    folder, path = tmp_path / "limited", study(STUDY)
+    assert campaign(path, "-o", folder, "--jobs", 1, "--time-limit", 0.01) == 0
+    done = rows(folder)
+    assert len(done) < 24
+    assert json.loads((folder / "summary.json").read_text())["runs"] == len(done)
+    assert f"cut short by --time-limit: {len(done)} of 24 runs are done" in capfd.readouterr().err
+    assert campaign(path, "-o", folder, "--jobs", 1) == 0
+    assert (folder / "runs.csv").read_bytes() == (whole / "runs.csv").read_bytes()
+
+
 def test_the_summary_tells_and_the_worst_can_be_replayed(study: Writer, whole: Path, tmp_path: Path, capfd) -> None:
     """Faults lower the probability of success; the command of the worst run makes the very same trajectory."""
     summary = json.loads((whole / "summary.json").read_text(encoding="utf-8"))
