@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.director import Command, Director, Event, State, wake_time
 from quarterdeck.mission.mission import Mission, Waypoint
-from quarterdeck.mission.timing import timed_route
+from quarterdeck.mission.timing import commanded_route
 
 LOOK = 1.0  # s between looks at who is in range
 PLACES = 50  # on each leg at which is asked whether a vehicle is in range again
@@ -108,11 +108,7 @@ def _apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 def _seconds_out(mission: Mission, id: str, last: State, known: Contact, bases: np.ndarray) -> float:  # noqa: A002
     """Return the seconds until a vehicle that goes on as it was told is in range of a base again, or has done it all."""
     vehicle: Vehicle = mission.vehicle(id)
-    ahead = known.told.get(id, ())[last.reached :]
-    points = np.array([(last.x, last.y, last.z), *((w.x, w.y, w.z) for w in ahead)])
-    legs, holds = ["start", *(w.leg for w in ahead)], [0.0, *(w.hold for w in ahead)]
-    pace = [1.0, *((w.speed or vehicle.speed) / vehicle.speed for w in ahead)]
-    route = timed_route(vehicle, points, legs, pace=pace, holds=holds)
+    route = commanded_route(vehicle, (last.x, last.y, last.z), known.told.get(id, ())[last.reached :])
     away = False
     for a, b in pairwise(route.waypoints):
         part = np.linspace(0.0, 1.0, PLACES)

@@ -39,7 +39,7 @@ def with_turns(points: np.ndarray, legs: Sequence[Leg], radius: float, space: Mu
     points = np.asarray(points, dtype=float)
     if radius <= 0 or len(points) < 3:
         return Driven(points, list(legs), np.ones(len(points)), np.zeros(len(points), dtype=bool))
-    heading, bend, length = _bends(points)
+    heading, bend, length = bends(points)
     reversal = np.abs(bend) > REVERSAL
     tangent = np.where(reversal, 0.0, radius * np.tan(np.abs(bend) / 2))
     crowded = tangent[:-1] + tangent[1:] > length + 1e-9
@@ -121,7 +121,7 @@ def driven(points: np.ndarray, radius: float) -> np.ndarray:
     points = np.asarray(points, dtype=float)
     if radius <= 0 or len(points) < 3:
         return points
-    heading, bend, length = _bends(points)
+    heading, bend, length = bends(points)
     tangent = np.where(np.abs(bend) > REVERSAL, 0.0, radius * np.tan(np.abs(bend) / 2))
     fits = np.abs(bend) <= REVERSAL
     fits[:-1] &= tangent[:-1] + tangent[1:] <= length + 1e-9
@@ -141,7 +141,7 @@ def driven(points: np.ndarray, radius: float) -> np.ndarray:
     return line[np.append(True, apart)]
 
 
-def _bends(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def bends(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return (n - 1,) headings of the legs, (n,) turns at the points (0 at the ends), (n - 1,) lengths."""
     step = np.diff(points, axis=0)
     heading = np.arctan2(step[:, 1], step[:, 0])

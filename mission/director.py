@@ -33,6 +33,7 @@ class State:
 class Event:
     """Something observed: `kind` such as `lost`, `returned`, `seen`, `served`, `met`, `blocked`; who, and about what.
 
+    `held`: it has stood for long before the vehicle `subject`, which lies at `data`'s place, `x` and `y`, and is not heard.
     `unreachable`: there is no way any more to the task `subject` (empty: to where the last command ends); `data` has the
     place, `x` and `y`, and `found`, a MultiPolygon of all that the robot has found and the plan does not know. It stays
     there until it is told something else.

@@ -12,9 +12,12 @@ from quarterdeck.coverage.guards.space import Space
 from quarterdeck.coverage.network import Network, network
 from quarterdeck.geo.geodesics import Geodesics, geodesics
 from quarterdeck.geo.scenario import Vehicle
+from quarterdeck.mission.corners import bends
 from quarterdeck.mission.guard_tours import improve_tours, makespan_bound, tour_times
 from quarterdeck.mission.mission import Guard, Layer, Leg, Route
 from quarterdeck.mission.timing import timed_route
+
+SHARP = np.pi / 3  # radians: an arc at a sharper bend passes more than a seventh of its radius away from the corner
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +153,10 @@ def _metres(line: np.ndarray) -> float:
 
 
 def guard_route(vehicle: Vehicle, tours: Tours, robot: int) -> Route:
-    """Return the route along a tour: from the start itself, up where it flies, past the guards, home."""
+    """Return the route along a tour: from the start itself, up where it flies, past the guards, home.
+
+    One that has a turn radius stops at guards where it bends sharply, and turns on the spot: its arc would not pass there.
+    """
     line, order, stops = tours.lines[robot], tours.order[robot], tours.stops[robot]
     guard_at = dict(zip(stops, order, strict=True))
     points = [(*vehicle.start, 0.0), *((x, y, vehicle.altitude) for x, y in line.tolist()), (*vehicle.home, 0.0)]
@@ -160,7 +166,10 @@ def guard_route(vehicle: Vehicle, tours: Tours, robot: int) -> Route:
     flies = vehicle.domain == "aerial"
     legs[1], legs[-1] = ("takeoff", "landing") if flies else (legs[1], legs[-1])
     used = [i for i in range(len(points)) if i == 0 or points[i] != points[i - 1] or tasks[i]]
-    return timed_route(vehicle, np.array(points)[used], [legs[i] for i in used], tasks=[tasks[i] for i in used])
+    places, stops_at = np.array(points)[used], [tasks[i] for i in used]
+    bend = np.abs(bends(places[:, :2])[1]) * (vehicle.turn_radius > 0.0)
+    holds = np.where((bend > SHARP) & [t is not None for t in stops_at], bend / vehicle.model.turn_rate, 0.0)
+    return timed_route(vehicle, places, [legs[i] for i in used], holds=holds.tolist(), tasks=stops_at)
 
 
 def guards_of(tours: Tours, team: Team) -> tuple[Guard, ...]:

@@ -6,9 +6,9 @@ tell it of a new plan. Silent for longer than the delay, it is given up, and sta
 When it is heard again, what it has done meanwhile counts, and it takes a part of what is left.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import inf
+from math import dist, inf
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,9 @@ from quarterdeck.mission.triage.plan import METHOD
 
 BERTH = 4.0  # lengths from its end: so near, whoever launches and recovers the vehicles clears the way
 COASTS = 2.0  # s at its speed that a vehicle may have gone on from where it was heard last
+DRIFTED = (
+    0.5  # lengths that one who was given up is off where it is thought to be, for which a new plan is worth its trouble
+)
 Tell = Callable[[float, Mission], None]
 
 
@@ -48,7 +51,8 @@ class _Memory:
     that each was commanded last, `serving` the task that it is at by them, and since when. `wrecks` are the ids that those
     who were given up have as obstacles, by vehicle, `found` the ids of what robots have found. `tellings` are all routes
     told anew so far, `reliefs` how far those had come whose part was given to others. `courses` say how each gets on with
-    what it was commanded last. `wishes` is how many of the late changes were heeded.
+    what it was commanded last. `wishes` is how many of the late changes were heeded. `sighted` are the metres x and y
+    at which others saw those who were given up.
     """
 
     mission: Mission
@@ -72,6 +76,7 @@ class _Memory:
     tellings: tuple[Telling, ...] = ()
     reliefs: Mapping[str, Telling] = field(default_factory=dict)
     wishes: int = 0
+    sighted: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     courses: Mapping[str, Course] = field(default_factory=dict)
 
 
@@ -115,6 +120,7 @@ def recovering(
             # Guards' numbers hold for one plan: what was seen unheard by an earlier one is seen again.
             if e.kind == "served" and (mission.method != "guards" or now.following.get(e.vehicle) is plan.get(e.vehicle))
         }
+        moved = _moved(now, first, states, events)
         barred = [e for e in events if e.kind == "unreachable" and (e.vehicle, e.subject) not in now.barred and e.subject]
         now = replace(
             now,
@@ -124,15 +130,16 @@ def recovering(
             barred=now.barred | {(e.vehicle, e.subject) for e in barred},
             untried=now.untried - {v for v, s in states.items() if s.alive and time > now.since},
             serving={**now.serving, **_at_work(now, time, states)},
+            sighted={v: place for v, place in {**now.sighted, **moved}.items() if v not in heard},
             courses={v: looked(c, first[v], states[v], time) for v, c in now.courses.items()},
         )
         speeds = _speeds(now, first)
         stale = {v for v in heard & plan.keys() if now.following.get(v) is not plan[v]}  # replanned while it was silent
         asked = [wish for when, wish in wishes[now.wishes :] if when <= time]
         now = replace(now, wishes=now.wishes + len(asked))
-        if due & plan.keys() or back or stale or barred or speeds or asked:
+        if due & plan.keys() or back or stale or barred or speeds or asked or moved:
             found = _found([e.data["found"] for e in barred])
-            after = _replanned(now, mission, time, states, found, speeds, asked, tell)
+            after = _replanned(now, mission, time, states, found, speeds, asked, moved.keys(), tell)
             if after.mission is not now.mission:
                 events = tuple(e for e in events if e not in barred)
             now = after
@@ -148,6 +155,20 @@ def recovering(
 
     ranged = mission.method != "guards" and any(v.range is not None for v in mission.vehicles)
     return within_range(direct, mission) if ranged else direct
+
+
+def _moved(
+    now: _Memory, first: Mapping[str, Vehicle], states: Mapping[str, State], events: Sequence[Event]
+) -> dict[str, tuple[float, float]]:
+    """Return where those who were given up are seen, who lie elsewhere than is known."""
+    found = {}
+    for e in events:
+        if e.kind == "held" and e.subject in now.given_up:
+            here = e.data["x"], e.data["y"]
+            known = now.sighted.get(e.subject, (states[e.subject].x, states[e.subject].y))
+            if dist(here, known) > DRIFTED * first[e.subject].model.length:
+                found[e.subject] = here
+    return found
 
 
 def _at_work(now: _Memory, time: float, states: Mapping[str, State]) -> dict[str, tuple[str, float]]:
@@ -187,6 +208,7 @@ def _replanned(
     found: tuple[Obstacle, ...],
     speeds: Mapping[str, float],
     asked: Sequence[Changes],
+    moved: Collection[str],
     tell: Tell | None,
 ) -> _Memory:
     """Return the memory with a new plan for all who are not given up, or, where nobody is left, the old one."""
@@ -210,8 +232,10 @@ def _replanned(
         headings={v: s.heading for v, s in states.items()},
         begun={task: (v, time - since if states[v].alive else 0.0) for v, (task, since) in now.serving.items()},
     )
-    new = {v: w for v in sorted(now.given_up - now.wrecks.keys()) if (w := _wreck(first, v, working, states)) is not None}
-    afloat = working & now.wrecks.keys()
+    lie = {**states, **{v: replace(states[v], x=x, y=y) for v, (x, y) in now.sighted.items()}}
+    afloat = (working | set(moved)) & now.wrecks.keys()
+    unmarked = sorted(now.given_up - (now.wrecks.keys() - afloat))
+    new = {v: w for v in unmarked if (w := _wreck(first, v, working, lie)) is not None}
     changes = Changes(
         lost=frozenset(planned & now.given_up),
         back=dict.fromkeys(sorted(working - planned)),
@@ -245,7 +269,7 @@ def _replanned(
         served={} if after.method == "guards" else now.served,  # its layer says what is seen
         used={v: s.energy_used for v, s in states.items()},
         undone=tuple(dict.fromkeys(left)),
-        untried=frozenset(told),
+        untried=now.untried | told.keys(),
         sent={v: way for v, way in now.sent.items() if v not in told},
         serving={v: work for v, work in now.serving.items() if v not in told},
         courses={v: c for v, c in now.courses.items() if v not in told},

@@ -163,6 +163,7 @@ class Running:
         self._turn()
         reached = self._reached()
         self.events += self._serve(reached)
+        self.events += self._held()
         self.events += [Event("lost", self.ids[i]) for i in np.flatnonzero(self.aground & ~self.given_up & ~self.lost)]
         self.given_up |= self.aground
         mute = dict(zip(self.ids, self.suffering["comms"].tolist(), strict=True))
@@ -350,7 +351,7 @@ class Running:
         idle = self.fleet.gather("idle")
         self.aground |= self.stuck > STUCK
         flying = self.aerial & (self.position[:, 2] > 1.0)
-        self.moored = idle & ~flying & (np.hypot(*(self.position[:, :2] - self.home).T) < self.harbour)
+        self.moored = idle & ~flying & (near < self.harbour)
         underway = ~self.moored & ~self.aground & (near > self.harbour)
         self.down = np.where(self.aerial & underway & ~idle & (self.position[:, 2] <= 0.0), self.down + DECIDE, 0.0)
         self.aground |= self.down > STUCK
@@ -375,6 +376,14 @@ class Running:
                     events.append(Event("served", vehicle.id, waypoint.task))
             self.told[i] = reached[i]
         return tuple(events)
+
+    def _held(self) -> list[Event]:
+        """Return who stands before one that is dead or silent, and where that one is."""
+        if self.lookout is not None:
+            return []
+        still = (self.lost | self.aground | self.suffering["comms"]) & ~self.moored
+        pairs = [(self.ids[i], self.ids[j], self.position[j]) for i, j in self.watch.held(self.time, self.position, still)]
+        return [Event("held", who, by, {"x": float(x), "y": float(y)}) for who, by, (x, y, _) in pairs]
 
     def _wind(self, step: float) -> np.ndarray:
         """(k, 3) wind at each vehicle."""

@@ -17,6 +17,7 @@ KEEP = 3.0  # lengths kept from other vehicles
 SLIM = 1.4  # half diagonals that count as a length where a hull is higher than long
 WARY = 0.2  # s between looks out for others where some are near
 WAITS = 8.0  # s that a vehicle stands for others before it goes around
+HELD = 60.0  # s after which one that stands says who lies in its way
 TURN = 40.0  # s that one of those who stand has to go around before it is another's turn
 AHEAD = 5.0  # s that one that is aside, or is to go there, looks ahead for room
 LAG = {"surface": 2.0, "ground": 0.3, "aerial": 0.5}  # s in which speed fades: of a vessel by its autopilot's gain
@@ -113,6 +114,16 @@ class Watch:
         standing = int((stood > WAITS).sum())
         order[:standing] = np.roll(order[:standing], int(time // TURN))
         return order, stood
+
+    def held(self, time: float, position: np.ndarray, still: np.ndarray) -> list[tuple[int, int]]:
+        """Return who has stood for another `HELD` s, and the nearest of those `still` (k,) that it keeps clear of."""
+        stood = time - self.since
+        pairs = []
+        for i in map(int, np.flatnonzero((stood >= HELD) & (stood % HELD < 1.0) & ~still)):
+            away = np.where(still, np.linalg.norm(position - position[i], axis=1), np.inf)
+            if away.min() < self.keep[i]:
+                pairs.append((i, int(away.argmin())))
+        return pairs
 
     def _has_room(self, i: int, here: np.ndarray, ahead: np.ndarray, aside: np.ndarray) -> bool:
         """Return whether vehicle `i`, now `here`, can go `ahead`, and as many metres further `aside`, all (2,)."""

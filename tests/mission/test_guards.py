@@ -50,6 +50,23 @@ def test_everything_is_seen_and_every_guard_is_passed_once(mode: str, clearance:
     assert mission.figures["makespan"] >= mission.bounds["makespan"] > 0
 
 
+def test_a_boat_stops_to_look_where_it_turns_back() -> None:
+    """Where a vessel turns sharply at a guard it stops: on an arc it would look from metres beside it; a rover need not."""
+    site = scenario((2.0, 2.0), area=shapely.box(0, 0, 100, 100))
+    boat = replace(site.vehicles[0], model=load_model("otter"), turn_radius=6.0)
+    for vehicle, stops in ((site.vehicles[0], False), (boat, True)):
+        route = plan_guards(replace(site, vehicles=(vehicle,)), range=60.0).routes[0]
+        x, y, _ = route.xyz.T
+        course = np.unwrap(np.arctan2(np.diff(y), np.diff(x)))
+        sharp = [
+            w.hold > 0
+            for w, turn in zip(route.waypoints[1:-1], np.abs(np.diff(course)), strict=True)
+            if w.task and turn > 2.0
+        ]
+        assert sharp
+        assert all(held == stops for held in sharp)
+
+
 def test_an_area_out_of_sight_is_refused_at_once() -> None:
     """Apart from where vehicles may be, by land or by more than they see: one line, not a search of every corner."""
     far = Area("far", as_multipolygon(shapely.box(200, 0, 400, 200)))

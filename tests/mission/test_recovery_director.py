@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from shapely import LineString, union_all
+from shapely import LineString, Point, union_all
 
 from quarterdeck.coverage.metrics import track_length
 from quarterdeck.geo.reader import read_scenario
@@ -84,22 +84,45 @@ def test_false_alarm_changes_nothing():
     assert run.report.passed
 
 
-def test_who_is_lost_as_it_is_told_of_a_plan_has_done_nothing_of_it():
+@pytest.mark.parametrize("between", [False, True], ids=["at once", "after another plan"])
+def test_who_is_lost_as_it_is_told_of_a_plan_has_done_nothing_of_it(between):
     """What a vehicle was given in the second in which it is lost goes to the others, however far it had come before."""
     mission = plan("west_ant_island")
     told = []
     director = recovering(mission, tell=lambda *plan: told.append(plan[1]))
     states = {r.vehicle: State(*r.xyz[-1], reached=len(r.waypoints) - 1) for r in mission.routes}  # all are home
-    first, second, *others = states
+    first, second, third, *others = states
     states[first] = State(*mission.routes[0].xyz[0], reached=0, idle=False)
     _, memory = director(0.0, states, (), None)
     states[first] = State(*mission.routes[0].xyz[0], alive=False)
     _, memory = director(10.0, states, (Event("lost", first),), memory)
     states[second] = replace(states[second], alive=False)  # as it was when it was told
-    states |= {v: replace(states[v], reached=0, idle=False) for v in others}
-    director(10.5, states, (Event("lost", second),), memory)
-    one, other = map(to_survey, told)
-    assert other == pytest.approx(one, rel=0.02)
+    states |= {v: replace(states[v], reached=0, idle=False) for v in (third, *others)}
+    if between:
+        states[third] = replace(states[third], alive=False)
+        _, memory = director(10.5, states, (Event("lost", third),), memory)
+    director(11.0, states, (Event("lost", second),), memory)
+    assert len(told) == 2 + between
+    assert to_survey(told[-1]) == pytest.approx(to_survey(told[0]), rel=0.02)
+
+
+def test_a_wreck_that_somebody_stands_before_is_where_it_is_seen():
+    """A wreck that has drifted is moved on the map once another tells that it stands before it, and then stays there."""
+    mission = plan("plant_yard")
+    told = []
+    director = recovering(mission, tell=lambda _, after: told.append(after))
+    states = {r.vehicle: State(*r.xyz[len(r.waypoints) // 2]) for r in mission.routes}
+    lost, other = states
+    seen = {"x": states[other].x + 3.0, "y": states[other].y}
+    _, memory = director(0.0, states, (), None)
+    states |= {lost: replace(states[lost], alive=False)}
+    _, memory = director(1.0, states, (Event("lost", lost),), memory)
+    for time in (100.0, 160.0):
+        _, memory = director(time, states, (Event("held", other, lost, seen),), memory)
+    wrecks = [[o.polygon.centroid for o in after.site.obstacles if o.id.startswith("wreck")] for after in told]
+    assert [len(w) for w in wrecks] == [1, 1]
+    assert wrecks[0][0].distance(Point(states[lost].x, states[lost].y)) < 0.01
+    assert wrecks[1][0].distance(Point(*seen.values())) < 0.01
 
 
 def test_who_comes_back_late_drives_all_that_is_left():
