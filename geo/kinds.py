@@ -12,7 +12,7 @@ HEADS = (
     (b"\xa3\x95", "a log of ArduPilot; `report --track` and `replan --track` take it"),
 )
 PLAN = "a PLAN; `check`, `simulate`, `export`, `replan`, `report` and `replay --site` take it"
-FATES = "what became of casualties, made by `triage`; no verb takes it"
+FATES = "what became of casualties, made by `triage`; `replay --site` takes it"
 CHANGES = "a file of changes; `replan --changes` takes it"
 SITE = "a site; `check`, `plan`, `assign` and `triage` take it"
 COLLECTIONS = (PLAN, FATES, CHANGES, SITE)

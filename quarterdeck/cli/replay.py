@@ -1,4 +1,4 @@
-"""`quarterdeck replay`: run a report, or a plan, again and compare."""
+"""`quarterdeck replay`: run a report, a plan or a drill again and compare."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from quarterdeck.cli.output import console
 from quarterdeck.cli.parameters import Real
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.files import read_bytes
-from quarterdeck.geo.kinds import PLAN, REPORT, kind_of
+from quarterdeck.geo.kinds import FATES, PLAN, REPORT, kind_of
 
 if TYPE_CHECKING:
     from quarterdeck.geo.geojson import Document
@@ -33,15 +33,17 @@ if TYPE_CHECKING:
 SHOWN = 20  # differences that are printed; --json has all
 
 
-@click.command(short_help="Run a report or a plan again, and compare.")
+@click.command(short_help="Run a report, a plan or a drill again, and compare.")
 @takes("file")
 @reads("--plan", help="The report's plan, where it is not found.")
-@reads("--site", pipe=True, help="The plan's site: it is planned again too, with its seed and parameters.")
+@reads("--site", pipe=True, help="The plan's or the drill's site: it is planned again too, with its seed and parameters.")
 @click.option("--within", type=Real(min=0), default=0.0, show_default=True,
               help="By what numbers may differ: a fraction, near 0 an amount; 0: to the last digit.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Write all differences as JSON to standard output.")
 def command(file: str, plan: str | None, site: str | None, within: float, as_json: bool) -> int:
-    """Run again what FILE came of, and print what differs: a report of `simulate` or `report`, or with --site a PLAN.
+    """Run again what FILE came of, and print what differs.
+
+    FILE is a report of `simulate` or `report`, or with --site a PLAN or what `triage` wrote of casualties.
 
     A report's files are looked for where its command had them, from here and from the report's folder and those above it,
     and beside the report; their hashes tell whether they are the same. Exit status 1 if anything differs. Another version
@@ -53,8 +55,8 @@ def command(file: str, plan: str | None, site: str | None, within: float, as_jso
     read = _read(file)
     if isinstance(read, Document):
         if site is None or plan is not None:
-            raise InputError(f"{file}: is a PLAN, not a report; to plan it again give its site by --site, and no --plan")
-        found += plan_again(read, site, within)
+            raise InputError(f"{file}: is no report; to run it again give its site by --site, and no --plan")
+        found += (drill_again if kind_of(read.data) == FATES else plan_again)(read, site, within)
     else:
         options = _with_files(read, file, plan)
         if site is not None:
@@ -73,13 +75,13 @@ def command(file: str, plan: str | None, site: str | None, within: float, as_jso
 
 
 def _read(file: str) -> Document | dict[str, Any]:
-    """Return a PLAN, or a report as JSON. Raises InputError if it is neither."""
+    """Return a PLAN, what became of casualties, or a report as JSON. Raises InputError if it is none of them."""
     from quarterdeck.geo.geojson import Document, parse, parse_json
 
     data = read_bytes(file)
     kind = kind_of(data)
     try:
-        if kind == PLAN:
+        if kind in (PLAN, FATES):
             return Document(file, data, parse(data))
         if kind == REPORT:
             return dict(parse_json(data))
@@ -167,6 +169,35 @@ def plan_again(plan: Document, site: str, within: float) -> Differences:
     return list(differences(_features(plan.content), _features(json.loads(plan_text(made))), within))
 
 
+def drill_again(drill: Document, site: str, within: float) -> Differences:
+    """Run triage on a site again as the header of what became of casualties tells, and return what differs, by feature.
+
+    Raises InputError if it was not of this site, or the header is damaged.
+    """
+    from quarterdeck.exporters.casualties import casualties_geojson
+    from quarterdeck.geo.reader import read_scenario
+    from quarterdeck.geo.typed import fits, from_json
+    from quarterdeck.mission.triage.outcome import run_triage
+    from quarterdeck.mission.triage.settings import METHODS, Settings
+    from quarterdeck.mission.world import Fault
+
+    scenario, features = read_scenario(site), _features(drill.content)
+    try:
+        header = features["triage"]["properties"]
+        method, seed, given = header["method"], header["seed"], header["parameters"]
+        settings = from_json(given["settings"], Settings)
+        faults = [from_json(fault, Fault) for fault in given["faults"]]
+        if method not in METHODS or not fits(seed, int) or seed < 0:
+            raise ValueError(f"method {method!r}, seed {seed!r}")
+        was = header["input_hash"]
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{drill.name}: does not tell what it came of ({error}); run triage again") from None
+    if was != scenario.input_hash:
+        raise InputError(f"{site}: is not the site that {drill.name} was made of (another SHA-256)")
+    outcome = run_triage(scenario, method, settings, seed=seed, faults=faults)
+    return list(differences(features, _features(json.loads(casualties_geojson(outcome))), within))
+
+
 def remade(plan: Mission, scenario: Scenario, file: str, site: str) -> Mission:
     """Return the mission that a plan's method, seed and parameters make of the scenario.
 
@@ -174,6 +205,8 @@ def remade(plan: Mission, scenario: Scenario, file: str, site: str) -> Mission:
     """
     from quarterdeck.api import assign
     from quarterdeck.api import plan as cover
+    from quarterdeck.mission.triage.plan import METHOD as TRIAGE
+    from quarterdeck.mission.triage.plan import plan_triage, settings_of
 
     if plan.input_hash != scenario.input_hash:
         raise InputError(f"{site}: is not the site that {file} was made of (another SHA-256)")
@@ -182,17 +215,19 @@ def remade(plan: Mission, scenario: Scenario, file: str, site: str) -> Mission:
     if (
         own_map
         or {"replanned_at", "sortie", "terrain"} & set(options)
-        or plan.method not in ("stc", "lines", "guards", "assign")
+        or plan.method not in ("stc", "lines", "guards", "assign", TRIAGE)
     ):
         raise InputError(
             f"{file}: was not made of a site alone (replanned, over terrain, on a map, or by hand); plan it as it was"
         )
     scenario = replace(scenario, name=plan.name)
     try:
+        if plan.method == TRIAGE:
+            return plan_triage(scenario, options["method"], settings_of(plan), seed=plan.seed)
         if plan.method == "assign":
             return assign(scenario, seed=plan.seed, **options)
         return cover(scenario, method=plan.method, seed=plan.seed, **options)
-    except TypeError as error:
+    except (KeyError, TypeError) as error:
         raise InputError(f"{file}: its parameters cannot be used ({error}); plan the site again") from None
 
 

@@ -89,6 +89,25 @@ def test_drills_replans_and_runs_are_the_same_in_others(kind: str, tmp_path: Pat
         made.append({path.name: path.read_bytes() for path in out.iterdir()})
     assert len(made[0]) >= 2
     assert made[0] == made[1] == made[2]
+    if kind == "triage":
+        for name in ("outcome.geojson", "plan.geojson"):
+            assert call("replay", tmp_path / "first" / name, "--site", DATA / "triage_drill.geojson") == 0
+
+
+def test_another_drill_is_told(tmp_path: Path, capsys) -> None:
+    """What did not come of the header's seed differs; a damaged header is one line."""
+    out, site = tmp_path / "out.geojson", DATA / "triage_drill.geojson"
+    assert call("triage", site, "--seed", 4, "--position-error", 1, "-o", out) == 0
+    text = out.read_text(encoding="utf-8")
+    capsys.readouterr()
+    for was, now, status, words in (
+        ('"seed": 4', '"seed": 5', 1, "triage.properties.figures"),
+        ('"clusters": 5', '"clusters": "x"', 2, "does not tell what it came of"),
+        ('"method": "relay"', '"method": "other"', 2, "does not tell what it came of"),
+    ):
+        out.write_text(text.replace(was, now), encoding="utf-8")
+        assert call("replay", out, "--site", site) == status
+        assert words in capsys.readouterr().err
 
 
 @pytest.fixture(scope="module")
