@@ -13,6 +13,7 @@ import numpy as np
 
 from quarterdeck.campaign.kind import Case
 from quarterdeck.campaign.study import Study
+from quarterdeck.geo.version import VERSION
 
 
 def wilson(successes: int, runs: int, confidence: float = 0.95) -> tuple[float, float]:
@@ -58,7 +59,10 @@ def summarise(study: Study, cases: Sequence[Case], rows: Mapping[int, Mapping[st
     done = [row for case in cases if (row := rows.get(case.number)) is not None]
     by_number = {case.number: case for case in cases}
     return {
+        "version": VERSION,
         "study": str(study.path),
+        "study_hash": study.hash,
+        "seed": study.seed,
         "source": None if study.source is None else str(study.source),
         "mission": study.name,
         "asked": study.count,

@@ -112,6 +112,7 @@ def test_the_summary_tells_and_the_worst_can_be_replayed(study: Writer, whole: P
     assert faulty["probability"] < 1.0
     assert faulty["low"] < faulty["probability"] < faulty["high"]
     assert summary["runs"] == summary["asked"] == 24
+    assert (summary["seed"], len(summary["study_hash"])) == (0, 64)
     assert summary["passed"] == calm["passed"] + faulty["passed"]
     assert summary["reasons"]
     worst = summary["worst"][0]
