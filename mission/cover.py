@@ -28,6 +28,7 @@ from quarterdeck.geo.version import VERSION
 from quarterdeck.mission.mission import Layer, Mission, Route, unbroken
 from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.routes import survey_lines, survey_routes
+from quarterdeck.mission.survey_shares import ranked, urgent_first
 from quarterdeck.mission.timing import seconds_out
 
 MAX_HYPERVERTICES = 800_000  # of which 390,000 take 1.0 GB in all (benchmarks/limits.py): so that 2 GB are enough
@@ -86,7 +87,8 @@ def cover_grid(
         if again.merit >= done.merit:
             break
         done = again
-    regions, routes = done.regions, done.routes
+    regions = done.regions
+    routes, reasons = urgent_first(scenario, roads, done.routes, done.reasons, step)
     figures = asdict(measure([t for own in done.tracks for t in own], site.coverable, grid))
     cells = np.array([region.cells for region in regions])
     figures |= {
@@ -111,9 +113,9 @@ def cover_grid(
         spacing=step,
         tasks=scenario.tasks,
         figures=figures,
-        bounds={"moves": max(region.bound for region in regions)},
-        reasons=tuple(done.reasons),
-        layers=(_region_layer(grid, vehicles, regions),),
+        bounds={} if ranked(site) else {"moves": max(region.bound for region in regions)},
+        reasons=tuple(reasons),
+        layers=() if ranked(site) else (_region_layer(grid, vehicles, regions),),
         input_hash=scenario.input_hash,
         version=VERSION,
     )

@@ -21,6 +21,7 @@ from quarterdeck.mission.mission import Layer, Leg, Mission, Route
 from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.routes import survey_lines, way_routes
 from quarterdeck.mission.seafloor import seen, spreads
+from quarterdeck.mission.survey_shares import ranked, urgent_first
 
 ROUNDS = 2  # of dividing again, once it is known how much there is to drive where
 
@@ -88,7 +89,8 @@ def plan_lines(
         if again.makespan >= done.makespan:
             break
         done = again
-    laid, routes, reasons = done.laid, done.routes, done.reasons
+    laid = done.laid
+    routes, reasons = urgent_first(scenario, roads, done.routes, done.reasons, step)
     site = scenario.site.coverable
     tracks = [t for lines in laid for t in lines.tracks]
     length, covered = sum(track_length(t) for t in tracks), covered_fraction(tracks, site, step) * site.area
@@ -122,7 +124,7 @@ def plan_lines(
         tasks=scenario.tasks,
         figures=figures,
         reasons=tuple(reasons),
-        layers=(_named(vehicles, laid),),
+        layers=() if ranked(scenario.site) else (_named(vehicles, laid),),
         input_hash=scenario.input_hash,
         version=VERSION,
     )

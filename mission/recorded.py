@@ -17,7 +17,7 @@ from quarterdeck.mission.mission import Mission, Route, unbroken
 from quarterdeck.mission.progress import Progress, ends_at, planned_progress
 from quarterdeck.mission.remaining import remaining_parts
 from quarterdeck.mission.served import served_tasks
-from quarterdeck.mission.survey_recovery import VISITED
+from quarterdeck.mission.survey_shares import VISITED
 from quarterdeck.mission.track import Track, energy_used
 from quarterdeck.mission.triage.stand import read_stand, stand_document
 

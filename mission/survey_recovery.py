@@ -1,31 +1,26 @@
 """A survey from now on, by spanning trees or lines: what is left of its lines, shared out among whoever works."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import shapely
-from shapely import LineString, MultiLineString, MultiPolygon, Point
+from shapely import LineString, MultiLineString, MultiPolygon
 
 from quarterdeck.coverage.metrics import swath, track_length
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Area, Scenario, Site, Vehicle, as_multipolygon
-from quarterdeck.geo.transit import Roadmap
 from quarterdeck.mission.changes import Changes
 from quarterdeck.mission.cover import cover, roadmaps, trackable
 from quarterdeck.mission.lines import plan_lines
-from quarterdeck.mission.mission import Layer, Mission, Route, unbroken, undone_layer
+from quarterdeck.mission.mission import Layer, Mission, unbroken, undone_layer
 from quarterdeck.mission.progress import Progress, with_surveyed
 from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.remaining import clipped, remaining_parts
-from quarterdeck.mission.routes import line_routes, survey_tracks
-from quarterdeck.mission.sharing import Line, Shares, Team, line_of, share_out, team_of, times
-from quarterdeck.mission.timing import RESERVE, seconds_out, shortfalls
-
-VISITED = 0.25  # spacings: a survey line is done where a track ran along it so near
-ROUNDS = 2  # of sharing out again, once ways and turns are known
-CUTS = 20  # tries to fit routes into the energy left
+from quarterdeck.mission.routes import survey_tracks
+from quarterdeck.mission.sharing import Line
+from quarterdeck.mission.survey_shares import VISITED, Access, shared, survey_paces
 
 
 def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, changes: Changes, *, seed: int) -> Mission:
@@ -37,11 +32,12 @@ def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, ch
     """
     spacing = float(mission.spacing or 0.0)
     roads = roadmaps(scenario)
-    access = _Access(scenario.vehicles, roads)
+    access = Access(scenario.vehicles, roads)
     undone, cut = _undone(mission, scenario, progress, changes)
     fresh, notes = _fresh(mission, scenario, changes, seed)
     own, released = _owned(undone, fresh, scenario.vehicles, access)
-    survey = _shared(mission, scenario, roads, own, released)
+    paces = survey_paces(mission.routes, mission.vehicles, scenario.vehicles, spacing)
+    survey = shared(scenario, roads, own, released, paces, spacing)
     left = [line.points for line in survey.left]
     ahead = [t for v, r in zip(scenario.vehicles, survey.routes, strict=True) for t in survey_tracks(v, r)]
     done = with_surveyed(mission, progress.tracks)
@@ -92,33 +88,6 @@ def _undone_layers(gaps: MultiPolygon, rim: MultiPolygon) -> tuple[Layer, ...]:
     """Return the areas that are not done, with why."""
     areas = [(g, why) for g, why in ((gaps, "left out"), (rim, "too near to what is new")) if g.area > 0]
     return (undone_layer(areas),) if areas else ()
-
-
-class _Access:
-    """Who can get where: by vehicle, the connected part of the water, ground or air that it is in, grown by a hair."""
-
-    def __init__(self, vehicles: Sequence[Vehicle], roads: Sequence[Roadmap]) -> None:
-        grown: dict[tuple[int, int], shapely.Geometry] = {}
-        self.keys = []
-        for vehicle, road in zip(vehicles, roads, strict=True):
-            parts = shapely.get_parts(road.polygon)
-            at = int(np.argmin(shapely.distance(parts, Point(vehicle.start)))) if len(parts) else -1
-            if (id(road), at) not in grown:
-                grown[id(road), at] = parts[at].buffer(0.01) if at >= 0 else MultiPolygon()
-                shapely.prepare(grown[id(road), at])
-            self.keys.append((id(road), at))
-        self.grown = grown
-
-    def lines(self, every: Sequence[np.ndarray]) -> list[Line]:
-        """Return the lines along (n, 2) points, with who can drive them."""
-        if not every:
-            return []
-        shapes = shapely.linestrings(
-            np.concatenate(every), indices=np.repeat(np.arange(len(every)), [len(x) for x in every])
-        )
-        inside = {key: shapely.covers(polygon, shapes) for key, polygon in self.grown.items()}
-        able = np.column_stack([inside[key] for key in self.keys])
-        return [line_of(points, who) for points, who in zip(every, able, strict=True)]
 
 
 def _undone(
@@ -176,7 +145,7 @@ def _owned(
     undone: Sequence[tuple[str | None, list[np.ndarray]]],
     fresh: Sequence[np.ndarray],
     vehicles: Sequence[Vehicle],
-    access: _Access,
+    access: Access,
 ) -> tuple[list[list[Line]], list[Line]]:
     """Return each vehicle's own lines, in order, and those that nobody has or whose vehicle cannot get there any more."""
     number = {v.id: i for i, v in enumerate(vehicles)}
@@ -190,128 +159,3 @@ def _owned(
         else:
             released.append(line)
     return own, released
-
-
-@dataclass(frozen=True, slots=True)
-class _Survey:
-    """Routes along lines, why some cannot be done, and the lines left out."""
-
-    routes: tuple[Route, ...]
-    reasons: tuple[Reason, ...]
-    left: list[Line]
-
-    @property
-    def merit(self) -> tuple[float, int, float]:
-        """Less is better: metres left out, what cannot be done, the makespan in seconds."""
-        return round(sum(x.length for x in self.left)), len(self.reasons), max(r.duration for r in self.routes)
-
-
-def _shared(
-    mission: Mission, scenario: Scenario, roads: Sequence[Roadmap], own: list[list[Line]], released: list[Line]
-) -> _Survey:
-    """Share lines out, and again once it is known what ways and turns add to straight lines; keep the best."""
-    vehicles, crumb = scenario.vehicles, float(mission.spacing or 0.0)
-    paces = _paces(mission, vehicles)
-    limits = np.array([seconds_out(v) for v in vehicles])
-    spent = np.zeros(len(vehicles))
-    classes = _classes(scenario.site, own, released, VISITED * crumb)
-    best: _Survey | None = None
-    for _ in range(1 + ROUNDS):
-        team = team_of(vehicles, paces, spent, limits)
-        shares = _by_priority(team, classes, crumb)
-        survey, taken = _affordable(vehicles, shares, roads, paces)
-        if best is not None and survey.merit >= best.merit:
-            break
-        best = survey
-        spent = spent + taken - times(team, shares.lines)
-    assert best is not None
-    return best
-
-
-def _paces(mission: Mission, vehicles: Sequence[Vehicle]) -> np.ndarray:
-    """Return (k,) seconds that a metre of survey takes, turns counted, as the plan's routes show them."""
-    shown = {}
-    for route in mission.routes:
-        metres = sum(track_length(line) for line in unbroken(route.xyz[:, :2], route.survey))
-        busy = np.array([w.leg in ("survey", "turn") for w in route.waypoints])
-        taken = float(np.diff([w.time for w in route.waypoints])[busy[1:]].sum())
-        if metres > float(mission.spacing or 0.0):
-            shown[route.vehicle] = taken / metres * mission.vehicle(route.vehicle).speed
-    usual = float(np.median(list(shown.values()))) if shown else 1.0
-    return np.array([max(1.0, shown.get(v.id, usual)) / v.speed for v in vehicles])
-
-
-def _classes(
-    site: Site, own: list[list[Line]], released: list[Line], short: float
-) -> list[tuple[list[list[Line]], list[Line]]]:
-    """Return own and released lines by the priority of the areas that they are in, the highest first."""
-    levels = sorted({a.priority for a in site.areas}, reverse=True)
-    if len(levels) < 2:
-        return [(own, released)]
-    classes = []
-    higher = MultiPolygon()
-    for level in levels:
-        part = as_multipolygon(shapely.union_all([a.polygon for a in site.areas if a.priority == level]).difference(higher))
-        higher = shapely.union(higher, part)
-        *mine, free = [
-            [line_of(piece, x.able) for x in lines for piece in clipped([x.points], part, short)]
-            for lines in (*own, released)
-        ]
-        classes.append((mine, free))
-    return classes
-
-
-def _by_priority(team: Team, classes: Sequence[tuple[list[list[Line]], list[Line]]], crumb: float) -> Shares:
-    """Share one class of lines out after the other, each from where the one before it ends."""
-    k = len(team.here)
-    lines: list[list[Line]] = [[] for _ in range(k)]
-    left: list[Line] = []
-    for own, released in classes:
-        shares = share_out(team, own, released, crumb=crumb)
-        left += shares.left
-        ends = [own[-1].points[-1] if own else here for own, here in zip(shares.lines, team.here, strict=True)]
-        home = np.array([float(team.home(i, end)) for i, end in enumerate(ends)])
-        team = replace(team, here=np.array(ends), spent=shares.times - home)
-        for mine, more in zip(lines, shares.lines, strict=True):
-            mine += more
-    return Shares(lines, shares.times, left)
-
-
-def _affordable(
-    vehicles: Sequence[Vehicle], shares: Shares, roads: Sequence[Roadmap], paces: np.ndarray
-) -> tuple[_Survey, np.ndarray]:
-    """Return the routes along lines, each cut at its end until its vehicle has the energy for it; and the (k,) seconds that
-    they would take uncut.
-    """
-    lines, left = [list(own) for own in shares.lines], list(shares.left)
-    taken = np.zeros(len(vehicles))
-    for attempt in range(CUTS):
-        routes, reasons = line_routes(vehicles, [[x.points for x in own] for own in lines], roads)
-        taken = taken if attempt else np.array([r.duration for r in routes])
-        poor = [i for i, (v, r) in enumerate(zip(vehicles, routes, strict=True)) if lines[i] and shortfalls(v, r)]
-        if not poor:
-            break
-        for i in poor:
-            metres = _excess(vehicles[i], routes[i]) / paces[i] if attempt < CUTS - 2 else np.inf
-            left += _dropped(lines[i], metres)
-    return _Survey(routes, tuple(reasons), left), taken
-
-
-def _excess(vehicle: Vehicle, route: Route) -> float:
-    """Return about how many seconds a route is too long for the energy and time that its vehicle has."""
-    over = 1.0 - seconds_out(vehicle) / max(route.duration, 1e-9)
-    return float(1.05 * max(over, 1.0 - (1 - RESERVE) * vehicle.battery / max(route.energy, 1e-9)) * route.duration)
-
-
-def _dropped(lines: list[Line], metres: float) -> list[Line]:
-    """Cut `metres` off the end of a vehicle's lines; return what is cut off."""
-    left: list[Line] = []
-    while lines and metres > 0:
-        last = lines.pop()
-        if last.length > metres + 1.0:
-            lines.append(last.part(0.0, last.length - metres))
-            left.append(last.part(last.length - metres, last.length))
-            break
-        left.append(last)
-        metres -= last.length
-    return left
