@@ -7,8 +7,6 @@ to; else it brakes. This is passive safety as Macek et al. 2009 and Bouraine et 
 trajectories: when somebody passes does not matter, so nobody need know how fast the others go.
 """
 
-from typing import Any
-
 import numpy as np
 from numba import njit
 
@@ -19,8 +17,6 @@ BACK = 0.15  # of its pace that one goes astern
 OPENING = 0.3  # of its way: so much one gets away by it that was too near
 PIECES = 3  # straight ones that a way is made of
 
-BRAKES = np.dtype([(n, float) for n in ("reach", "brake", "lag", "surge")])
-
 
 @njit(cache=True)
 def brake_in_time(
@@ -29,6 +25,7 @@ def brake_in_time(
     rate: np.ndarray,
     facing: np.ndarray,
     pace: np.ndarray,
+    reach: np.ndarray,
     brakes: np.ndarray,
     present: np.ndarray,
     order: np.ndarray,
@@ -41,13 +38,13 @@ def brake_in_time(
     One that has to brake and `backs` (k,) off goes astern, `slow` below 0, if it gets away from whom it is too near to.
 
     `position` (k, 3); `velocity` (k, 3) m/s over ground; `rate` (k,) rad/s of turn; `facing` (k, 3) the direction in which
-    each sets out if it stands, zeros for one that goes nowhere; `pace` (k,) m/s as planned; `brakes` (k,) BRAKES: half the
-    hull's diagonal, m, m/s2 of braking, seconds in which speed fades at the least, and m/s2 of setting out. They choose in
-    `order` (k,); those that are `passing` (k,) others come as near as TOUCH.
+    each sets out if it stands, zeros for one that goes nowhere; `pace` (k,) m/s as planned; `reach` (k,) half the hull's
+    diagonal, m; `brakes` (k, 3): m/s2 of braking, seconds in which speed fades at the least, and m/s2 of setting out. They
+    choose in `order` (k,); those that are `passing` (k,) others come as near as TOUCH.
     """
     count = len(position)
     ways = np.empty((count, PIECES + 1, 3))
-    far = np.zeros(count)
+    far, keep = np.zeros(count), np.empty(count)
     for i in range(count):
         if present[i]:
             far[i] = _way(ways[i], position[i], velocity[i], rate[i], facing[i], 0.0, brakes[i])
@@ -58,52 +55,49 @@ def brake_in_time(
             continue
         wanted = min(pace[i], slow[i])
         further = _way(on, position[i], velocity[i], rate[i], facing[i], wanted, brakes[i])
-        clear, close = True, False
+        close = False
         for j in range(count):
-            if j == i or not present[j]:
-                continue
-            dx, dy, dz = position[j] - position[i]
-            away = np.sqrt(dx * dx + dy * dy + dz * dz)
-            touch = TOUCH * (brakes[i].reach + brakes[j].reach)
-            keep = touch if passing[i] or not np.any(facing[j] != 0.0) else SPARE * touch
-            near |= away < keep + further + far[j] + pace[i] + pace[j]
-            if away < keep + further + far[j]:
-                after = _between(on, ways[j])
-                clear &= after >= keep or _opens(on, further, after, ways[j])
-                close |= away < SPARE * touch
-        if clear and wanted > 0.0:
-            ways[i], far[i] = on, further
-        elif not clear:
+            touch = TOUCH * (reach[i] + reach[j])
+            keep[j] = touch if passing[i] or not np.any(facing[j] != 0.0) else SPARE * touch
+            if j != i and present[j]:
+                away = _away(position[i], position[j])
+                near |= away < keep[j] + further + far[j] + pace[i] + pace[j]
+                close |= away < min(keep[j] + further + far[j], SPARE * touch)
+        if not _keeps_off(i, on, further, ways, far, keep, present):
             slow[i] = 0.0
             if backs[i] and close:
                 astern = BACK * pace[i]
                 further = _way(on, position[i], velocity[i], rate[i], -facing[i], astern, brakes[i])
-                clear = True
-                for j in range(count):
-                    if j != i and present[j] and clear:
-                        touch = TOUCH * (brakes[i].reach + brakes[j].reach)
-                        after = _between(on, ways[j])
-                        clear = after >= SPARE * touch or _opens(on, further, after, ways[j])
-                if clear:
+                keep[:] = SPARE * TOUCH * (reach[i] + reach)
+                if _keeps_off(i, on, further, ways, far, keep, present):
                     slow[i], ways[i], far[i] = -astern, on, further
+        elif wanted > 0.0:
+            ways[i], far[i] = on, further
     return near
 
 
 @njit(cache=True)
 def _way(
-    way: np.ndarray, position: np.ndarray, velocity: np.ndarray, rate: float, facing: np.ndarray, wanted: float, b: Any
+    way: np.ndarray,
+    position: np.ndarray,
+    velocity: np.ndarray,
+    rate: float,
+    facing: np.ndarray,
+    wanted: float,
+    brakes: np.ndarray,
 ) -> float:
     """Set `way` (PIECES + 1, 3), the places passed until at rest, and return its length.
 
     If `wanted` m/s is 0 it brakes now, else after it has gone on and gained on it for LOOK.
     """
+    brake, lag, surge = brakes
     ux, uy, uz = velocity
     if wanted > 0.0:
-        gain = min(max(wanted - (ux * facing[0] + uy * facing[1] + uz * facing[2]), 0.0), b.surge * LOOK)
+        gain = min(max(wanted - (ux * facing[0] + uy * facing[1] + uz * facing[2]), 0.0), surge * LOOK)
         ux, uy, uz = ux + gain * facing[0], uy + gain * facing[1], uz + gain * facing[2]
     speed = np.sqrt(ux * ux + uy * uy + uz * uz)
-    time = max(b.lag, speed / (2 * b.brake)) + (LOOK if wanted > 0.0 else 0.0)
-    turn = rate * b.lag if speed > 0.05 else 0.0  # radians, all along
+    time = max(lag, speed / (2 * brake)) + (LOOK if wanted > 0.0 else 0.0)
+    turn = rate * lag if speed > 0.05 else 0.0  # radians, all along
     for n in range(PIECES + 1):
         part = n / PIECES
         cos, sin = np.cos(0.5 * turn * part), np.sin(0.5 * turn * part)
@@ -111,6 +105,28 @@ def _way(
         way[n, 1] = position[1] + part * time * (sin * ux + cos * uy)
         way[n, 2] = position[2] + part * time * uz
     return time * speed
+
+
+@njit(cache=True)
+def _keeps_off(
+    i: int, way: np.ndarray, length: float, ways: np.ndarray, far: np.ndarray, keep: np.ndarray, present: np.ndarray
+) -> bool:
+    """Return whether `way` of vehicle `i`, `length` metres, keeps `keep` (k,) off the others', or opens."""
+    for j in range(len(ways)):
+        if j != i and present[j]:
+            nearest = _away(way[0], ways[j, 0]) - length - far[j]
+            if nearest < keep[j]:
+                nearest = _between(way, ways[j])
+            if nearest < keep[j] and not _opens(way, length, nearest, ways[j]):
+                return False
+    return True
+
+
+@njit(cache=True)
+def _away(here: np.ndarray, there: np.ndarray) -> float:
+    """Return the distance between two places, metres."""
+    dx, dy, dz = here[0] - there[0], here[1] - there[1], here[2] - there[2]
+    return np.sqrt(dx * dx + dy * dy + dz * dz)
 
 
 @njit(cache=True)

@@ -46,6 +46,14 @@ class Squad(ABC):
         position, _ = self.pose()
         self.table = command_track(self.tracks, self.table, i, position[i], waypoints, self.vehicles[i].speed)
 
+    def stop_short(self, i: int) -> None:
+        """Let the leg that the squad's vehicle `i` is on end where it is: somebody else is where it was to end."""
+        position, _ = self.pose()
+        track = self.tracks[i]
+        for axis, value in zip("xyz", position[i].tolist(), strict=True):
+            self.table[axis][track["leg"]] = value
+        track["aside"] = track["want"] = 0.0
+
     @property
     def idle(self) -> np.ndarray:
         """(k,) bool: has done all it was told."""

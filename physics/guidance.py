@@ -40,7 +40,7 @@ def guide_vessels(
         t, lim = tracks[i], limits[i]
         x, y, psi = pose[i, 0], pose[i, 1], pose[i, 2]
         _observe_drift(t, psi, velocity[i], rate[i], step)
-        ground = np.hypot(velocity[i, 0], velocity[i, 1])
+        ground, before = np.hypot(velocity[i, 0], velocity[i, 1]), t.leg
         if t.mode == HOLD and time >= t.until:
             _depart(t)
         if t.mode == SAIL:
@@ -52,6 +52,8 @@ def guide_vessels(
             elif not stop and remaining <= _wheel_over(t, table, lim, max(ground, 0.3), length):
                 t.leg += 1
                 t.integral = 0.0
+        if t.leg != before:
+            _keep_aside(t, table, x, y)
         if t.mode == SAIL:
             tx, ty, length, along, cross = _leg(t, table, x, y)
             remaining = length - along
@@ -84,7 +86,8 @@ def guide_vessels(
             heading[i], speed[i] = course if t.mode == SAIL else psi, 0.0
             continue
         heading[i] = np.arctan2(wy, wx)
-        if t.mode == SAIL and ground < 0.3 and abs(_wrap(heading[i] - psi)) > 1.0:  # without way on: on the spot
+        # Without way on it turns on the spot, until it faces where it is to go.
+        if t.mode == SAIL and (ground < 0.3 or speed[i] == 0.0) and abs(_wrap(heading[i] - psi)) > 1.0:
             speed[i] = 0.0
             continue
         # Far off its heading it slows down, to as little as half: the turn is the tighter.
@@ -109,7 +112,7 @@ def guide_rovers(
     """
     for i in range(len(tracks)):
         t, lim = tracks[i], limits[i]
-        x, y, psi = pose[i, 0], pose[i, 1], pose[i, 2]
+        x, y, psi, before = pose[i, 0], pose[i, 1], pose[i, 2], t.leg
         if t.mode == HOLD and time >= t.until:
             _depart(t)
             if t.mode == SAIL:
@@ -126,6 +129,8 @@ def guide_rovers(
                     t.mode = ROTATE
             elif length - along <= 0:
                 t.leg += 1
+        if t.leg != before:
+            _keep_aside(t, table, x, y)
         speed[i] = turn[i] = 0.0
         if t.mode == HOLD or t.mode == IDLE:
             t.cross, t.turning = 0.0, True
@@ -196,7 +201,7 @@ def guide_multirotors(
             if t.reach >= length:
                 if _stops(t, table, time):
                     t.reach, t.pace = length, 0.0
-                    if gap < 0.5 and (length == 0.0 or abs(t.aside) < 0.2 * lim.length):  # back on its path
+                    if gap < 0.5 and abs(t.aside) < 0.2 * lim.length:  # back on its path
                         _arrive(t, table, time)
                 else:
                     t.reach -= length
@@ -208,17 +213,22 @@ def guide_multirotors(
                         turn = np.arctan2(dy, dx) - reference[i, 6]
                         t.reach -= t.aside * np.sin(turn)
                         t.aside *= np.cos(turn)
-        if t.mode == SAIL and length > 0:
-            s, v = min(t.reach, length) / length, t.pace / length
+        if t.mode == SAIL:
+            s, v = (min(t.reach, length) / length, t.pace / length) if length > 0 else (1.0, 0.0)
             reference[i, 0], reference[i, 1], reference[i, 2] = a.x + s * dx, a.y + s * dy, a.z + s * dz
             reference[i, 3], reference[i, 4], reference[i, 5] = v * dx, v * dy, v * dz
             if np.hypot(dx, dy) > 0.1:
                 reference[i, 6] = np.arctan2(dy, dx)
-            _step_aside(t, min(b.speed, max(t.slow, 0.0)), step)  # here the shift is the motion
-            reference[i, 0] += t.aside * np.sin(reference[i, 6])
-            reference[i, 1] -= t.aside * np.cos(reference[i, 6])
+            before, sin, cos = t.aside, np.sin(reference[i, 6]), np.cos(reference[i, 6])
+            ends = 3.0 * np.sqrt(lim.accel * abs(t.want - t.aside))  # as fast as it can stop there
+            _step_aside(t, min(b.speed, max(t.slow, 0.0), ends), step)  # here the shift is the motion
+            shift = (t.aside - before) / step
+            reference[i, 0] += t.aside * sin
+            reference[i, 1] -= t.aside * cos
+            reference[i, 3] += shift * sin
+            reference[i, 4] -= shift * cos
             px, py, pz = position[i, 0] - a.x, position[i, 1] - a.y, position[i, 2] - a.z
-            along = (px * dx + py * dy + pz * dz) / length
+            along = (px * dx + py * dy + pz * dz) / max(length, 1e-9)
             t.cross = np.sqrt(max(px * px + py * py + pz * pz - along * along, 0.0))
             t.turning = along < lim.zone or length - along < lim.zone or t.aside != 0
         else:
@@ -232,6 +242,14 @@ def _step_aside(t: Any, speed: float, step: float) -> None:
     """Move towards the offset that separation wants, at a third of `speed`."""
     most = 0.33 * speed * step
     t.aside += min(max(t.want - t.aside, -most), most)
+
+
+@njit(cache=True)
+def _keep_aside(t: Any, table: np.ndarray, x: float, y: float) -> None:
+    """Carry the offset over to a new leg: one that is aside stays where it is, to port or to starboard of that."""
+    _, _, length, _, cross = _leg(t, table, x, y)
+    if length > 0.0:
+        t.aside = min(max(-cross, -abs(t.aside)), abs(t.aside))
 
 
 @njit(cache=True)

@@ -25,7 +25,7 @@ from quarterdeck.physics.world import INCONSISTENT, World
 
 DECIDE = 1.0  # s between calls of the director
 HARBOUR = 4.0  # lengths: so near its start or end a vehicle is being launched or recovered
-CRASH = 4.0  # m/s: a multirotor that meets the ground faster is out of the mission
+CRASH, SKID = 4.0, 0.5  # m/s down, and over the ground: a multirotor that meets it faster is out of the mission
 ASIDE = 50.0  # m about the ground routes in which PyBullet has the terrain
 UP = np.array([0.0, 0.0, 1.0])
 STUCK = 60.0  # s in contact, or down from the air, without a pause: the vehicle is given up
@@ -135,7 +135,7 @@ class Running:
                 squad, place = self.fleet.of(i)
                 squad.adopt(place, body, psi, v, r, self.current)
                 position[i], heading[i], velocity[i] = body, psi, (body - self.position[i]) / step
-        falling = (self.velocity[:, 2] < -CRASH) | self.lost
+        falling = (self.velocity[:, 2] < -CRASH) | (np.hypot(*self.velocity[:, :2].T) > SKID) | self.lost
         self.aground |= self.aerial & falling & (position[:, 2] <= 0.0)
         self.position, self.heading, self.velocity, self.rate = position, heading, velocity, rate
         self.stuck = np.where(self.contact, self.stuck + step, 0.0)

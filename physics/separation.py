@@ -24,6 +24,7 @@ def give_way(
     speed: np.ndarray,
     pace: np.ndarray,
     aside: np.ndarray,
+    offset: np.ndarray,
     keep: np.ndarray,
     present: np.ndarray,
     place: np.ndarray,
@@ -39,8 +40,9 @@ def give_way(
 
     `position` (k, 3); `course` (k, 2) the level direction of the leg, `leg` (k, 3) that in space, zeros for one that lies
     still, `side` (k, 2) what is to starboard; `speed` (k,) over ground and `pace` (k,) as planned, m/s, 0 for one that is
-    done; `aside` (k,) how far off its leg each has already gone; `keep` (k,) the distance kept; `present` (k,) those out
-    there; `place` (k,) in the order in which they go. One that `stands` (k,) too long passes by those that stand and come
+    done; `aside` (k,) how far off its leg each has already gone for that, `offset` (k,) how far to starboard of it each is;
+    `keep` (k,) the distance kept; `present` (k,) those out there; `place` (k,) in the order in which they go. One that
+    `stands` (k,) too long passes by those that stand and come
     after it, and obeys no other rule. Conflicts are looked for between the legs as planned, so that a vehicle stays aside
     until the other is past.
     """
@@ -65,7 +67,7 @@ def give_way(
                 along = px * leg[i, 0] + py * leg[i, 1] + pz * leg[i, 2]
                 aft = px * side[i, 0] + py * side[i, 1]  # to starboard
                 off = px * px + py * py + pz * pz - along * along - aft * aft
-                aft += aside[i]  # of the leg
+                aft += offset[i]  # of the leg
                 berth = BERTH * apart
                 passing = -berth if aside[i] != 0.0 else 0.0  # aside until it is past
                 ahead = berth + max(speed[i], 0.25 * pace[i]) * HORIZON
@@ -76,7 +78,7 @@ def give_way(
                     one, other = max(aft + PASS * berth, 0.0), min(aft - PASS * berth, 0.0)
                     starboard = aside[i] > 0.0 if aside[i] != 0.0 else one < -other  # and it keeps to that side
                     want[i], instead[i] = (one, other) if starboard else (other, one)
-                    lack = 0.9 * berth - abs(aft - aside[i])
+                    lack = 0.9 * berth - abs(aft - offset[i])
                     if lack > 0.0:  # not yet aside: no faster than it gets there
                         soon = 0.33 * (along - berth) / lack if along > berth else 0.0
                         slow[i] = min(slow[i], pace[i] * (0.25 if stands[i] else max(soon, 0.25)))

@@ -137,7 +137,8 @@ def _autopilot(s: np.ndarray, p: Any, heading: float, speed: float, dt: float) -
     turning = min(max(moment / (2 * p.lever), -half / p.lever), half / p.lever)
     mean = min(max(surge / 2, p.astern + abs(turning)), p.ahead - abs(turning))
     if mean == surge / 2:  # else the integrals would wind up
-        s[ZU] = min(max(s[ZU] + 0.05 * (speed - s[U]) * dt, -0.5), 0.5)
+        gain = 0.05 if (speed - s[U]) * s[ZU] >= 0.0 else 0.5  # what it had to push for is soon forgotten
+        s[ZU] = min(max(s[ZU] + gain * (speed - s[U]) * dt, -0.5), 0.5)
     s[ZR] = min(max(s[ZR] + 0.5 * slip * dt, -0.3), 0.3)
     return mean - turning, mean + turning
 

@@ -7,7 +7,7 @@ import shapely
 from shapely import LineString
 
 from quarterdeck.geo.scenario import Site, Vehicle
-from quarterdeck.physics.braking import BRAKES, TOUCH, brake_in_time
+from quarterdeck.physics.braking import SPARE, TOUCH, brake_in_time
 from quarterdeck.physics.fleet import Fleet
 from quarterdeck.physics.paths import HOLD
 from quarterdeck.physics.separation import give_way
@@ -34,10 +34,9 @@ class Watch:
         self.hull = np.array([[v.model.length, v.model.width] for v in vehicles])
         self.aerial = np.array([v.domain == "aerial" for v in vehicles])
         height = np.array([HEIGHT[v.domain] for v in vehicles]) * self.aerial  # others pass above and below
-        reach = np.linalg.norm([*self.hull.T, height], axis=0) / 2
-        self.keep = KEEP * np.maximum(self.length, SLIM * reach)
-        rows = [(v.model.acceleration, LAG[v.domain], _surge(v)) for v in vehicles]
-        self.brakes = np.array([(r, *row) for r, row in zip(reach.tolist(), rows, strict=True)], BRAKES)
+        self.reach = np.linalg.norm([*self.hull.T, height], axis=0) / 2
+        self.keep = KEEP * np.maximum(self.length, SLIM * self.reach)
+        self.brakes = np.array([(v.model.acceleration, LAG[v.domain], _surge(v)) for v in vehicles])
         margins = [(v.domain, TOUCH * v.model.width / 2) for v in vehicles]
         rooms = {key: site.navigable(*key) for key in sorted(set(margins))}
         shapely.prepare(list(rooms.values()))
@@ -74,7 +73,10 @@ class Watch:
         leg = (end - start) * going[:, None] / np.maximum(np.linalg.norm(end - start, axis=1), 1e-9)[:, None]
         bow = np.column_stack([np.cos(heading), np.sin(heading)])
         side = np.where(np.any(course != 0.0, axis=1, keepdims=True), course, bow)[:, ::-1] * [1.0, -1.0]
-        give_way(position, course, leg, side, speed, pace, aside, self.keep, present, place, stands, slow, want, instead)
+        offset = np.sum((position - start)[:, :2] * side, axis=1)
+        give_way(
+            position, course, leg, side, speed, pace, aside, offset, self.keep, present, place, stands, slow, want, instead
+        )
         for i in map(int, np.flatnonzero(((want != 0) | (aside != 0)) & going)):
             reach = course[i] * min(max(speed[i], 0.5 * pace[i]) * AHEAD, rest[i])
             sides = [w for w in (want[i], instead[i], aside[i], 0.0) if not np.isnan(w)]
@@ -93,10 +95,13 @@ class Watch:
         backs = stands & passing
         for i in map(int, np.flatnonzero(backs)):
             backs[i] = self._has_room(i, position[i, :2], -0.5 * self.keep[i] * facing[i, :2], np.zeros(2))
-        self.wary = brake_in_time(position, velocity, rate, facing, pace, self.brakes, present, order, passing, backs, slow)
+        self.wary = brake_in_time(
+            position, velocity, rate, facing, pace, self.reach, self.brakes, present, order, passing, backs, slow
+        )
         self.slow = slow
         for squad in fleet.squads:
             squad.tracks["slow"], squad.tracks["want"] = slow[squad.index], want[squad.index]
+        self._stop_short(fleet, position, end, stands, present & (pace == 0.0))
 
     def _stand(
         self, time: float, position: np.ndarray, going: np.ndarray, passing: np.ndarray
@@ -124,6 +129,15 @@ class Watch:
             if away.min() < self.keep[i]:
                 pairs.append((i, int(away.argmin())))
         return pairs
+
+    def _stop_short(self, fleet: Fleet, position: np.ndarray, end: np.ndarray, stands: np.ndarray, still: np.ndarray) -> None:
+        """Have those who stand (k,) before one that lies `still` (k,) where their leg has its `end` (k, 3) be content."""
+        for i in map(int, np.flatnonzero(stands)):
+            touch = TOUCH * (self.reach[i] + self.reach)
+            there = still & (np.linalg.norm(position - end[i], axis=1) < touch)
+            if (there & (np.linalg.norm(position - position[i], axis=1) < SPARE * touch)).any():
+                squad, place = fleet.of(i)
+                squad.stop_short(place)
 
     def _has_room(self, i: int, here: np.ndarray, ahead: np.ndarray, aside: np.ndarray) -> bool:
         """Return whether vehicle `i`, now `here`, can go `ahead`, and as many metres further `aside`, all (2,)."""

@@ -7,18 +7,18 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from shapely import LineString
 
-from quarterdeck.physics.braking import BRAKES, TOUCH, _apart, brake_in_time
+from quarterdeck.physics.braking import TOUCH, _apart, brake_in_time
 
 NOBODY = np.zeros(2, bool)
 
 
 def _look(position, velocity, facing, *, passing=NOBODY, backs=NOBODY):
     """Return the speeds allowed to two vehicles of 1 m/s, half a metre of half diagonal, 1 m/s2 of brakes."""
-    brakes = np.array([(0.5, 1.0, 0.3, 5.0)] * 2, BRAKES)
+    brakes = np.array([(1.0, 0.3, 5.0)] * 2)
     slow = np.full(2, np.inf)
     brake_in_time(
         np.array(position, float), np.array(velocity, float), np.zeros(2), np.array(facing, float), np.ones(2),
-        brakes, np.ones(2, bool), np.arange(2), passing, backs, slow,
+        np.full(2, 0.5), brakes, np.ones(2, bool), np.arange(2), passing, backs, slow,
     )  # fmt: skip
     return slow
 

@@ -134,6 +134,16 @@ def test_a_quad_with_half_a_rotor_crashes_and_stays_there(mow) -> None:
 
 
 @pytest.mark.usefixtures("needs_pybullet")
+def test_a_quad_that_sinks_slowly_does_not_skid_on(mow) -> None:
+    """From a metre up it comes down gently: over the ground it goes a metre or two, not on along its route."""
+    run = simulate(mow("crazyflie", spacing=2.0), faults=["thruster:crazyflie-1@20"])
+    down = int(np.argmax((run.trace.time > 20.0) & (run.trace.z[:, 0] <= 0.0)))
+    place = np.column_stack([run.trace.x[:, 0], run.trace.y[:, 0]])
+    assert run.report.vehicles[0].aground
+    assert np.hypot(*(place[-1] - place[down])) < 2.0
+
+
+@pytest.mark.usefixtures("needs_pybullet")
 def test_half_power_is_slower_but_arrives(mow) -> None:
     """A rover with half its left wheels' speed still follows its legs, and takes longer."""
     mission = mow("husky", spacing=5.0, length=40.0)

@@ -1,5 +1,8 @@
 """Encounters: nobody touches anybody, and everybody arrives."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from shapely import MultiPolygon, box
 
@@ -7,6 +10,7 @@ from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.models import load_model
 from quarterdeck.geo.scenario import Area, Scenario, Site, Task, Vehicle
 from quarterdeck.mission.assign import assign
+from quarterdeck.mission.mission import Route
 from quarterdeck.mission.recovery import recovering
 from quarterdeck.physics.simulate import simulate
 
@@ -57,6 +61,23 @@ def test_crossing_the_one_with_the_other_to_starboard_lets_it_pass(sail):
     north, west = (trace.y[:, 0] > 0).argmax(), (trace.x[:, 1] < 0).argmax()
     assert west < north  # the west-going one is first at the crossing
     assert abs(trace.y[:, 1]).max() < 0.5  # and keeps its course
+
+
+@pytest.mark.parametrize("model", ["otter", "husky", "survey-quad"])
+def test_who_finds_another_where_it_is_to_go_goes_on_from_beside_it(sail, model):
+    """One is done and stays at the other's waypoint: the other comes as near as it can, and then home."""
+    reach = 0.3 * REACH[model]
+    mission = sail(model, [(-0.8 * reach, 0), (reach, 0)], [(-reach, 0), (reach, 0), (-reach, 0)])
+    there = replace(mission.vehicles[0], end=(0.0, 10 * reach))  # far from home it is not taken out of the water
+    first, second = (tuple(w for w in r.waypoints if w.leg != "landing") for r in mission.routes)
+    held = tuple(replace(w, hold=5.0) if w.x == reach else w for w in second)
+    run = simulate(
+        replace(mission, vehicles=(there, mission.vehicles[1]), routes=(Route("v1", first), Route("v2", held))),
+        duration=300.0,
+    )
+    assert run.report.vehicles[1].finished
+    assert run.report.figures["collisions"] == 0
+    assert np.hypot(run.trace.x[:, 1] - reach, run.trace.y[:, 1]).min() < 2.5 * load_model(model).length
 
 
 def test_separation_holds_while_replanning():

@@ -5,7 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from quarterdeck.geo.models import load_model
+from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.mission import Route, Waypoint
+from quarterdeck.physics.guidance import guide_multirotors
+from quarterdeck.physics.paths import IDLE, WAYPOINT, command_track, empty_tracks, vehicle_limits
 from quarterdeck.physics.simulate import simulate
 from quarterdeck.physics.wind import MEMORY, step_gusts
 
@@ -47,6 +51,33 @@ def test_holds_where_it_is_told_and_leaves_when_time_is_up(sail, model, near):
     away = np.hypot(trace.x[:, 0] - 20, trace.y[:, 0])
     assert np.count_nonzero(away < near) * 0.1 >= 30.0
     assert 29.0 < trace.time[-1] - through.time[-1] < 50.0
+
+
+def test_vessel_at_half_power_turns_back_where_it_is(sail):
+    """With one propeller of two at half power it waits at the end of a leg, then turns about in two lengths to go back."""
+    mission = sail("otter", [(0, 0), (60, 0), (0, 0)])
+    first, far, home = mission.routes[0].waypoints
+    held = (first, replace(far, hold=20.0), home)
+    trace = simulate(replace(mission, routes=(Route("v1", held),)), faults=["thruster:v1@5"]).trace
+    off = np.maximum(np.abs(trace.y[:, 0]), trace.x[:, 0] - 60.0)
+    assert off.max() < 4.0
+
+
+def test_multirotor_goes_back_to_a_leg_of_no_length_as_it_can():
+    """Shifted aside at a waypoint that is told twice, its reference comes back in steps, not at once."""
+    vehicles = (Vehicle("v1", load_model("survey-quad"), (0.0, 0.0), speed=8.0),)
+    limits, tracks = vehicle_limits(vehicles), empty_tracks(1)
+    ways = [Waypoint(10.0, 0.0, 40.0), Waypoint(10.0, 0.0, 40.0)]
+    table = command_track(tracks, np.zeros(0, WAYPOINT), 0, np.array([0.0, 0.0, 40.0]), ways, 8.0)
+    reference = np.array([[0.0, 0.0, 40.0, 0.0, 0.0, 0.0, 0.0]])
+    steps = []
+    for time in np.arange(0.0, 20.0, 0.1):
+        tracks["want"] = 2.0 if time < 2.0 else 0.0
+        before = reference.copy()
+        guide_multirotors(time, 0.1, before[:, :3].copy(), limits, tracks, table, reference)
+        steps.append(np.hypot(*(reference - before)[0, :2]))
+    assert max(steps) < 1.0
+    assert tracks["mode"][0] == IDLE
 
 
 @pytest.mark.parametrize("column", [0, 1, 2])
