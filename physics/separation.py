@@ -42,9 +42,8 @@ def give_way(
     still, `side` (k, 2) what is to starboard; `speed` (k,) over ground and `pace` (k,) as planned, m/s, 0 for one that is
     done; `aside` (k,) how far off its leg each has already gone for that, `offset` (k,) how far to starboard of it each is;
     `keep` (k,) the distance kept; `present` (k,) those out there; `place` (k,) in the order in which they go. One that
-    `stands` (k,) too long passes by those that stand and come
-    after it, and obeys no other rule. Conflicts are looked for between the legs as planned, so that a vehicle stays aside
-    until the other is past.
+    `stands` (k,) too long passes by those that stand and come after it, and obeys no other rule. Conflicts are looked for
+    between the legs as planned, so that a vehicle stays aside until the other is past.
     """
     for i in range(len(position)):
         slow[i], want[i], instead[i] = np.inf, 0.0, np.nan

@@ -130,7 +130,9 @@ class Watch:
                 pairs.append((i, int(away.argmin())))
         return pairs
 
-    def _stop_short(self, fleet: Fleet, position: np.ndarray, end: np.ndarray, stands: np.ndarray, still: np.ndarray) -> None:
+    def _stop_short(
+        self, fleet: Fleet, position: np.ndarray, end: np.ndarray, stands: np.ndarray, still: np.ndarray
+    ) -> None:
         """Have those who stand (k,) before one that lies `still` (k,) where their leg has its `end` (k, 3) be content."""
         for i in map(int, np.flatnonzero(stands)):
             touch = TOUCH * (self.reach[i] + self.reach)
