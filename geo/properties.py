@@ -49,7 +49,9 @@ PROPERTIES: dict[str, dict[str, Property]] = {
     "area": {
         "id": _ID,
         "priority": Property(
-            {"type": "integer", "minimum": 0}, "a whole number from 0", "higher ones first, in guards plans and `replan`"
+            {"type": "integer", "minimum": 0},
+            "a whole number from 0",
+            "areas of a higher one are covered first, by everybody",
         ),
         "spacing": _number("a number above 0", "metres between neighbouring tracks (the paper's 2 delta)", **_POSITIVE),
         "width": _number(

@@ -144,10 +144,10 @@ def _paced(route: Route) -> Command:
     made: list[Waypoint] = []
     for last, w in zip(route.waypoints, route.waypoints[1:], strict=False):
         seconds, metres = w.time - last.time - last.hold, hypot(w.x - last.x, w.y - last.y)
-        if metres > 0:
+        if metres > 0 and seconds > 0:
             made.append(replace(w, speed=metres / seconds, time=0.0))
-        else:
-            made.append(replace(w, hold=w.hold + seconds, time=0.0))
+        else:  # or so near that its time is lost beside the time so far
+            made.append(replace(w, hold=w.hold + max(seconds, 0.0), time=0.0))
     return Command(tuple(made))
 
 
