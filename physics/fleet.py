@@ -11,7 +11,7 @@ import numpy as np
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.mission import Waypoint
 from quarterdeck.physics import multirotor, rover, vessel
-from quarterdeck.physics.guidance import guide_multirotors, guide_rovers, guide_vessels
+from quarterdeck.physics.guidance import guide_multirotors, guide_rovers, guide_vessels, nearing_rovers
 from quarterdeck.physics.paths import IDLE, ROTATE, SAIL, WAYPOINT, command_track, empty_tracks, vehicle_limits
 
 
@@ -95,6 +95,11 @@ class Squad(ABC):
         """(k,) metres, on the plan, to the end of the leg that each is on."""
         end = self.table[self.tracks["leg"]]
         return np.hypot(*(self.pose()[0][:, :2] - np.column_stack([end["x"], end["y"]])).T)
+
+    @property
+    def nearing(self) -> np.ndarray:
+        """(k,) m/s that each goes at most because it stops at the end of its leg; infinity where it may not."""
+        return np.full(len(self.tracks), np.inf)
 
     @property
     def aside(self) -> np.ndarray:
@@ -221,6 +226,10 @@ class Rovers(Squad):
 
     def pose(self) -> tuple[np.ndarray, np.ndarray]:
         return np.column_stack([self.state[:, :2], np.zeros(len(self.state))]), self.state[:, rover.PSI]
+
+    @property
+    def nearing(self) -> np.ndarray:
+        return nearing_rovers(self.limits, self.tracks, self.table, self.rest)
 
     def velocity(self, current: np.ndarray) -> np.ndarray:
         speed, psi = self.state[:, [rover.LEFT, rover.RIGHT]].mean(axis=1) * self.active, self.state[:, rover.PSI]

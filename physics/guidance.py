@@ -162,6 +162,17 @@ def guide_rovers(
 
 
 @njit(cache=True)
+def nearing_rovers(limits: np.ndarray, tracks: np.ndarray, table: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Return (k,) m/s that rovers, `rest` (k,) metres from the ends of their legs, go at most if they stop there."""
+    speed = np.full(len(tracks), np.inf)
+    for i in range(len(tracks)):
+        t = tracks[i]
+        if t.leg >= t.last or table[t.leg].hold > 0 or abs(_corner(t, table)) > CORNER:
+            speed[i] = max(np.sqrt(2 * 0.7 * limits[i].accel * rest[i]), 0.05)
+    return speed
+
+
+@njit(cache=True)
 def guide_multirotors(
     time: float,
     step: float,

@@ -2,10 +2,11 @@
 
 All robots that are in contact put what they see into one map; one that nobody hears goes on with its own copy, and what it
 saw counts when it is heard again. Where what was found bars the way ahead, a robot plans anew by A* to where it next has
-something to do. Where there is no way any more, it stops and says so.
+something to do. Where there is no way any more, it stops and says so. A triage team goes around those who stand in its way
+as robots with lidar do: who is in range of others' eyes needs none to be seen.
 """
 
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from quarterdeck.geo.occupancy import FREE, Occupancy, site_occupancy
 from quarterdeck.geo.scenario import Site, Vehicle, as_multipolygon
 from quarterdeck.mission.director import Event
 from quarterdeck.mission.mission import Waypoint
+from quarterdeck.physics.braking import TOUCH
 from quarterdeck.physics.fleet import Fleet
 from quarterdeck.physics.mapping import WALL, Evidence, fuse, no_evidence
 from quarterdeck.physics.paths import ROTATE, SAIL
@@ -32,7 +34,7 @@ PATIENCE = 60.0  # s without getting further, after which there is no way
 STANDS, MOVED = 10.0, 0.3  # s in which a robot that is under way and has not moved so many metres has stalled
 QUEUE = 300.0  # s for which it lets others keep it from its way
 YIELDS = 10.0  # s that one that made room waits there
-ROOM = 1.4  # lengths about the middle of another robot that a way around it, or out of its way, keeps
+ROOM = 1.25  # times as far off another robot as two may come, a way around it, or out of its way, keeps
 PLACES = 12  # that are looked at to make room
 
 
@@ -54,6 +56,8 @@ class Rerouting:
 
     def __init__(self, site: Site, vehicles: Sequence[Vehicle], lidars: np.ndarray) -> None:
         self.site, self.vehicles, self.lidars = site, vehicles, lidars
+        half = np.array([np.hypot(v.model.length, v.model.width) / 2 for v in vehicles])
+        self.room = ROOM * TOUCH * (half + half[lidars].max())
         self.shared = no_evidence(site, CELL)
         self.apart: dict[int, Evidence] = {}  # the maps of robots that are not heard
         self.detours: dict[int, Detour] = {}
@@ -68,6 +72,7 @@ class Rerouting:
         self.stuck: set[int] = set()  # those that have no way
         self.strange = {-1: np.zeros((0, 0), bool)}  # of the common map (-1), and of those of robots that are not heard
         self.free: dict[float, np.ndarray] = {}
+        self.looked = False  # somebody has: there is more to know than the plan does
 
     def begin(self, fresh: Iterable[int]) -> None:
         """Forget the detours of robots that have a fresh command."""
@@ -91,6 +96,7 @@ class Rerouting:
         Those that are not `sure` (k,) of their place add nothing. Echoes of robots that are `present` and not `mute` (k,)
         are of no obstacle.
         """
+        self.looked = True
         for i in [i for i in self.apart if not mute[i]]:
             seen = self.apart.pop(i).values
             stronger = np.abs(seen) > np.abs(self.shared.values)
@@ -142,6 +148,8 @@ class Rerouting:
 
     def found(self, i: int) -> np.ndarray:
         """Return (m, 2) metres: the centres of the cells where robot `i` knows of something that its map does not have."""
+        if not self.looked:
+            return np.zeros((0, 2))
         cells = np.argwhere((self.map_of(i).values > WALL) & (self._clear_of(KNOWN)))
         return self._grid(i).to_metres(cells + 0.5)
 
@@ -160,25 +168,29 @@ class Rerouting:
         fresh: Container[int],
         stalled: np.ndarray,
         present: np.ndarray,
+        there: np.ndarray,
     ) -> list[Event]:
         """Tell the robots of `fleet` whose way is barred to drive around; return an event of each that has no way any more.
 
         They are at `believed` (k, 3), on `commands`, of which some are `fresh`; `stalled` (k,) are those that get no
-        further, `present` (k,) those at work.
+        further, `present` (k,) those at work, `there` (k,) those that are in others' way.
         """
         events = []
         actual, mode = fleet.gather("reached"), fleet.gather("tracks")["mode"]
+        there = there & np.array([v.domain == "ground" for v in self.vehicles])
         done = self.reached(actual)
         for i in self.lidars.tolist():
             command = commands[i]
             if done[i] >= len(command) or not present[i] or (mode[i] not in (SAIL, ROTATE) and i not in fresh):
                 continue
             ahead = self._driven(i, command)[actual[i] :]
-            others = [
-                np.array([believed[j, :2], *((w.x, w.y) for w in self._driven(j, commands[j])[actual[j] :])])
-                for j in np.flatnonzero(present).tolist()
+            others = {
+                j: np.array(
+                    [believed[j, :2], *((w.x, w.y) for w in self._driven(j, commands[j])[actual[j] :] if present[j])]
+                )
+                for j in np.flatnonzero(there).tolist()
                 if j != i
-            ]
+            }
             detour = self._detour(
                 i, time, believed[i, :2], command, int(done[i]), ahead,
                 fresh=i in fresh, stalled=bool(stalled[i]), others=others,
@@ -211,21 +223,22 @@ class Rerouting:
         *,
         fresh: bool,
         stalled: bool,
-        others: Sequence[np.ndarray],
+        others: Mapping[int, np.ndarray],
     ) -> Detour | None:
         """Return another way for robot `i`, now `here` (2,), if its own is barred; None if it may go on as it does.
 
         `done` of its `command`'s waypoints are reached, `ahead` are those that it now makes for. Its way is looked at when
         the command is `fresh`, and against what was found; when it has `stalled`, or stood still for STANDS, it looks for a
-        way around the `others` too: of each the (q, 2) places where it is and is going. If there is none, it makes room for
-        them, the last in the list first, and comes back.
+        way around the `others` too: of each the (q, 2) places where it is and is going. To a place where one stays it goes
+        as near as it may. If there is no way, it makes room for them, the last in the list first, and comes back. Who makes
+        no map keeps to its waypoints, the next that it can reach first, and waits for as long as it takes.
         """
         vehicle, grid = self.vehicles[i], self._grid(i)
         stop = next((j for j, w in enumerate(command[done:], done) if _to_do(w)), len(command) - 1)
         standing = self._standing(i, time, here)
         self.stalled[i] = min(self.stalled[i], time) if stalled else np.inf
         if stalled or standing >= STANDS:
-            if time > self.stalled[i] + PATIENCE or standing > QUEUE:
+            if time > self.stalled[i] + PATIENCE or (standing > QUEUE and self.looked):
                 return Detour((), 0, stop, done)
             if time < self.tried[i] + AGAIN:
                 return None
@@ -237,12 +250,13 @@ class Rerouting:
         stalled = stalled or standing >= STANDS
         if stalled and len(others):
             clear = free
-            free = free & _aside(grid, np.array([way[0] for way in others]), ROOM * vehicle.model.length)
+            free = free & _aside(grid, np.array([way[0] for way in others.values()]), self.room[i])
         # Who is nearer to a thing than the clearance goes to the nearest place that is not, as plans do.
         reach = vehicle.clearance + 2 * grid.resolution
-        for j in range(stop, len(command)):
+        for j in range(stop if self.looked else done, len(command)):
             goal = np.array([command[j].x, command[j].y])
-            ends = nearest_free(grid, free, np.array([here, goal]), reach)
+            taken = any(len(way) == 1 and np.hypot(*(way[0] - goal)) < self.room[i] for way in others.values())
+            ends = nearest_free(grid, free, np.array([here, goal]), reach + self.room[i] * taken)
             path = find_ways(grid, free, ends, "octile").path(0, 1)
             if path is not None:
                 path = path[1:] if np.hypot(*(path[0] - here)) < CELL and len(path) > 2 else path
@@ -254,9 +268,9 @@ class Rerouting:
             if command[j].task is not None:
                 break
         if stalled:
-            later = sum(np.hypot(*(way[0] - here)) < 6 * vehicle.model.length for way in others[i:])
-            if others and standing >= STANDS * (1 + later):
-                return self._make_room(i, here, clear, free, others, command, stop, done)
+            near = [j for j, way in others.items() if np.hypot(*(way[0] - here)) < 6 * vehicle.model.length]
+            if others and standing >= STANDS * (1 + sum(j > i for j in near)):
+                return self._make_room(i, here, clear, free, list(others.values()), command, stop, done)
             return None
         self.barred[i] = min(self.barred[i], time)
         return Detour((), 0, stop, done) if time >= self.barred[i] + LOOK else None
@@ -277,8 +291,13 @@ class Rerouting:
         `clear` (rows, cols) are the cells without, `free` those with the others in them.
         """
         vehicle, grid = self.vehicles[i], self._grid(i)
-        along = [shapely.get_coordinates(LineString(w).segmentize(grid.resolution)) if len(w) > 1 else w for w in others]
-        off = np.argwhere(free & _aside(grid, np.concatenate(along), ROOM * vehicle.model.length))
+        # GEOS cannot segmentize a line of no length.
+        ways = [LineString(w) if np.ptp(w, axis=0).any() else None for w in others]
+        along = [
+            w if way is None else shapely.get_coordinates(way.segmentize(grid.resolution))
+            for w, way in zip(others, ways, strict=True)
+        ]
+        off = np.argwhere(free & _aside(grid, np.concatenate(along), self.room[i]))
         places = grid.to_metres(off + 0.5)
         places = places[np.argsort(np.hypot(*(places - here).T), kind="stable")]
         chosen: list[np.ndarray] = []

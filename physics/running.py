@@ -94,6 +94,8 @@ class Running:
         if self.terrain is not None:
             self._lay(self.terrain)
         self.lookout = look_out(self.mission, self.terrain)
+        if self.lookout is not None and self.router is None:  # people and robots find ways around who stands in theirs
+            self.router = Rerouting(self.known, vehicles, np.flatnonzero(~self.aerial))
         self.world.add_obstacles(blocking, self.terrain)
         stand = [o for o in self.mission.site.obstacles if o.id in passing]
         self.bodies = {o.id: self.world.add_obstacles([o] if self._blocks(o) else [], self.terrain) for o in stand}
@@ -186,8 +188,8 @@ class Running:
         self._moor()
         if self.senses is not None:
             self.senses.note()
-            if self.router is not None:
-                self._reroute(self.senses, self.router, fresh)
+        if self.router is not None:
+            self._reroute(self.router, fresh)
         over = bool((self.fleet.gather("idle") & ~self.lost | self.aground | self.lost & ~self.aerial).all())
         told = all(mute[e.vehicle] for e in self.events) and not (self.aground & ~self.given_up).any()
         self.done = over and told and wake_time(self.memory) == np.inf and not self._heard_again(mute)
@@ -325,14 +327,17 @@ class Running:
             self.events.append(Event("blocked", self.ids[i], data={"x": x, "y": y}))
         self.stalled = senses.stalled.copy()
 
-    def _reroute(self, senses: Senses, router: Rerouting, fresh: set[int]) -> None:
-        """Have robots with lidar put on their maps what they see, and drive around what bars their way."""
-        present, believed = ~self.moored & ~self.aground & ~self.lost, senses.navigation.believed
-        sure = senses.navigation.sure | self.sensing.mapping
+    def _reroute(self, router: Rerouting, fresh: set[int]) -> None:
+        """Have robots with lidar put on their maps what they see, and all drive around what bars their way."""
+        there = ~self.moored & ~self.aground
+        present, believed = there & ~self.lost, np.column_stack([self.position[:, :2], self.heading])
         router.begin(fresh)
-        router.look(believed, sure, senses.angles, senses.ranges, REACH, self.suffering["comms"], present)
+        if self.senses is not None and len(self.senses.lidars):
+            believed, sure = self.senses.navigation.believed, self.senses.navigation.sure | self.sensing.mapping
+            angles, ranges, mute = self.senses.angles, self.senses.ranges, self.suffering["comms"]
+            router.look(believed, sure, angles, ranges, REACH, mute, present)
         commands = [self.commands.get(id, ()) for id in self.ids]  # noqa: A001
-        self.events += router.drive_around(self.time, self.fleet, believed, commands, fresh, senses.stalled, present)
+        self.events += router.drive_around(self.time, self.fleet, believed, commands, fresh, self.stalled, present, there)
 
     def _reached(self) -> np.ndarray:
         """Return (k,) how many waypoints of its last command each has reached."""

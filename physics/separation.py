@@ -25,6 +25,7 @@ def give_way(
     pace: np.ndarray,
     aside: np.ndarray,
     offset: np.ndarray,
+    rest: np.ndarray,
     keep: np.ndarray,
     present: np.ndarray,
     place: np.ndarray,
@@ -40,10 +41,11 @@ def give_way(
 
     `position` (k, 3); `course` (k, 2) the level direction of the leg, `leg` (k, 3) that in space, zeros for one that lies
     still, `side` (k, 2) what is to starboard; `speed` (k,) over ground and `pace` (k,) as planned, m/s, 0 for one that is
-    done; `aside` (k,) how far off its leg each has already gone for that, `offset` (k,) how far to starboard of it each is;
-    `keep` (k,) the distance kept; `present` (k,) those out there; `place` (k,) in the order in which they go. One that
-    `stands` (k,) too long passes by those that stand and come after it, and obeys no other rule. Conflicts are looked for
-    between the legs as planned, so that a vehicle stays aside until the other is past.
+    done; `aside` (k,) how far off its leg each has already gone for that, `offset` (k,) how far to starboard of it each is,
+    `rest` (k,) how far it has to the leg's end, metres; `keep` (k,) the distance kept; `present` (k,) those out there;
+    `place` (k,) in the order in which they go. One that `stands` (k,) too long passes by those that stand and come after
+    it, and obeys no other rule. Conflicts are looked for between the legs as planned, so that a vehicle stays aside until
+    the other is past.
     """
     for i in range(len(position)):
         slow[i], want[i], instead[i] = np.inf, 0.0, np.nan
@@ -69,7 +71,7 @@ def give_way(
                 aft += offset[i]  # of the leg
                 berth = BERTH * apart
                 passing = -berth if aside[i] != 0.0 else 0.0  # aside until it is past
-                ahead = berth + max(speed[i], 0.25 * pace[i]) * HORIZON
+                ahead = berth + min(max(speed[i], 0.25 * pace[i]) * HORIZON, rest[i])
                 room = WIDE * apart if np.any(leg[j] != 0.0) else berth
                 # In its way, or in that back to its leg.
                 between = min(aside[i], 0.0) - room < aft < max(aside[i], 0.0) + room

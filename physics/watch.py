@@ -74,9 +74,11 @@ class Watch:
         bow = np.column_stack([np.cos(heading), np.sin(heading)])
         side = np.where(np.any(course != 0.0, axis=1, keepdims=True), course, bow)[:, ::-1] * [1.0, -1.0]
         offset = np.sum((position - start)[:, :2] * side, axis=1)
+        to_go = np.linalg.norm(end - position, axis=1)
         give_way(
-            position, course, leg, side, speed, pace, aside, offset, self.keep, present, place, stands, slow, want, instead
-        )
+            position, course, leg, side, speed, pace, aside, offset, to_go, self.keep, present, place, stands,
+            slow, want, instead,
+        )  # fmt: skip
         for i in map(int, np.flatnonzero(((want != 0) | (aside != 0)) & going)):
             reach = course[i] * min(max(speed[i], 0.5 * pace[i]) * AHEAD, rest[i])
             sides = [w for w in (want[i], instead[i], aside[i], 0.0) if not np.isnan(w)]
@@ -95,6 +97,7 @@ class Watch:
         backs = stands & passing
         for i in map(int, np.flatnonzero(backs)):
             backs[i] = self._has_room(i, position[i, :2], -0.5 * self.keep[i] * facing[i, :2], np.zeros(2))
+        slow = np.minimum(slow, fleet.gather("nearing"))
         self.wary = brake_in_time(
             position, velocity, rate, facing, pace, self.reach, self.brakes, present, order, passing, backs, slow
         )

@@ -57,6 +57,9 @@ def search_paths(
     """
     room = as_multipolygon(free.intersection(field))
     paths = _tours(room, starts, spacing) if not room.is_empty else None
+    if paths is not None:  # to where a tour begins, around what is in between
+        entries = [ways(start, (float(p[0, 0]), float(p[0, 1])))[:-1] for start, p in zip(starts, paths, strict=True)]
+        paths = tuple(np.array([*entry, *path]) for entry, path in zip(entries, paths, strict=True))
     if paths is None and rest:
         paths = tuple(np.array([start]) for start in starts)
     if paths is None:

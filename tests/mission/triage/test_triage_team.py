@@ -56,6 +56,16 @@ def test_what_lacks_is_one_clear_line(change, words) -> None:  # type: ignore[no
     assert "\n" not in str(error.value)
 
 
+def test_a_search_begins_on_the_ugvs_own_side_of_a_wall() -> None:
+    """The nearest place of the tour lies behind a fence: the UGV drives around to it."""
+    base = paper_team(ugvs=1)
+    fence = Obstacle("fence", box(39.0, 0.0, 39.2, 45.0))
+    scenario = replace(base, site=Site(base.site.areas, base.site.operating, (fence,)))
+    scenario = replace(scenario, vehicles=tuple(replace(v, start=(38.4, 20.0)) for v in base.vehicles))
+    path = make_team(scenario, "no-relay", Settings()).search.paths[0]
+    assert LineString([(38.4, 20.0), *path]).distance(fence.polygon) > 0.4
+
+
 def test_all_of_the_sample_is_searched() -> None:
     """A detour to what tours leave out takes the UGV off the leg that it is put into: that is made up for."""
     scenario = read_scenario(Path(__file__).parents[3] / "data" / "triage_drill.geojson")
