@@ -34,13 +34,13 @@ def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, ch
     roads = roadmaps(scenario)
     access = Access(scenario.vehicles, roads)
     undone, cut = _undone(mission, scenario, progress, changes)
-    fresh, notes = _fresh(mission, scenario, changes, seed)
+    done = with_surveyed(mission, progress.tracks)
+    fresh, notes = _fresh(mission, scenario, changes, done, seed)
     own, released = _owned(undone, fresh, scenario.vehicles, access)
     paces = survey_paces(mission.routes, mission.vehicles, scenario.vehicles, spacing)
     survey = shared(scenario, roads, own, released, paces, spacing)
     left = [line.points for line in survey.left]
     ahead = [t for v, r in zip(scenario.vehicles, survey.routes, strict=True) for t in survey_tracks(v, r)]
-    done = with_surveyed(mission, progress.tracks)
     driven = _swath([*(np.array(line.coords) for line in done), *ahead], spacing)
     site = scenario.site.coverable
     missed = as_multipolygon(shapely.difference(site, driven, grid_size=1e-6 * spacing))
@@ -108,14 +108,23 @@ def _undone(
     return [(owner, clipped(left, reach, short)) for owner, left in undone], [x for _, left in undone for x in left]
 
 
-def _fresh(mission: Mission, scenario: Scenario, changes: Changes, seed: int) -> tuple[list[np.ndarray], list[str]]:
-    """Return the (n, 2) survey lines of areas that are new, and of what obstacles that are gone have kept uncovered."""
+def _fresh(
+    mission: Mission, scenario: Scenario, changes: Changes, done: Sequence[LineString], seed: int
+) -> tuple[list[np.ndarray], list[str]]:
+    """Return the (n, 2) survey lines of areas that are new, and of what obstacles that are gone have kept uncovered.
+
+    What those `done` have covered meanwhile, or before, is not covered again.
+    """
     spacing, site = float(mission.spacing or 0.0), scenario.site
     areas = list(changes.areas)
     margin = max(v.clearance for v in scenario.vehicles) + spacing / 2
+    sliver = VISITED * spacing / 2
     for obstacle in mission.site.obstacles:
         if obstacle.id in changes.gone:
-            freed = as_multipolygon(obstacle.polygon.buffer(margin, join_style="mitre").intersection(site.area))
+            around = obstacle.polygon.buffer(margin, join_style="mitre").intersection(site.area)
+            near = [np.array(line.coords) for line in done if shapely.dwithin(line, around, spacing / 2)]
+            bare = around.difference(_swath(near, spacing))
+            freed = as_multipolygon(bare.buffer(-sliver).buffer(sliver).intersection(bare))
             areas += [Area(obstacle.id, freed)] if freed.area > 0 else []
     lines, notes = [], []
     vehicles = tuple(replace(v, share=None) for v in scenario.vehicles)

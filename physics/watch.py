@@ -18,6 +18,7 @@ SLIM = 1.4  # half diagonals that count as a length where a hull is higher than 
 WARY = 0.2  # s between looks out for others where some are near
 WAITS = 8.0  # s that a vehicle stands for others before it goes around
 HELD = 60.0  # s after which one that stands says who lies in its way
+NEAR = 2.0  # of the distance kept: so near others may be what one stands for
 TURN = 40.0  # s that one of those who stand has to go around before it is another's turn
 AHEAD = 5.0  # s that one that is aside, or is to go there, looks ahead for room
 LAG = {"surface": 2.0, "ground": 0.3, "aerial": 0.5}  # s in which speed fades: of a vessel by its autopilot's gain
@@ -124,13 +125,12 @@ class Watch:
         return order, stood
 
     def held(self, time: float, position: np.ndarray, still: np.ndarray) -> list[tuple[int, int]]:
-        """Return who has stood for another `HELD` s, and the nearest of those `still` (k,) that it keeps clear of."""
+        """Return who has stood for another `HELD` s, each with those `still` (k,) that are near."""
         stood = time - self.since
         pairs = []
         for i in map(int, np.flatnonzero((stood >= HELD) & (stood % HELD < 1.0) & ~still)):
-            away = np.where(still, np.linalg.norm(position - position[i], axis=1), np.inf)
-            if away.min() < self.keep[i]:
-                pairs.append((i, int(away.argmin())))
+            near = still & (np.linalg.norm(position - position[i], axis=1) < NEAR * self.keep[i])
+            pairs += [(i, int(j)) for j in np.flatnonzero(near)]
         return pairs
 
     def _stop_short(
