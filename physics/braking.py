@@ -30,12 +30,13 @@ def brake_in_time(
     present: np.ndarray,
     order: np.ndarray,
     passing: np.ndarray,
-    backs: np.ndarray,
+    astern: np.ndarray,
     slow: np.ndarray,
 ) -> bool:
     """Set `slow` (k,), the speed allowed, m/s, to 0 for each that has to brake; return whether some are near to others.
 
-    One that has to brake and `backs` (k,) off goes astern, `slow` below 0, if it gets away from whom it is too near to.
+    One that has to brake goes `astern` (k, 3), in that direction, `slow` below 0, if it gets away from whom it is too near
+    to; zeros for one that is not to.
 
     `position` (k, 3); `velocity` (k, 3) m/s over ground; `rate` (k,) rad/s of turn; `facing` (k, 3) the direction in which
     each sets out if it stands, zeros for one that goes nowhere; `pace` (k,) m/s as planned; `reach` (k,) half the hull's
@@ -65,12 +66,12 @@ def brake_in_time(
                 close |= away < min(keep[j] + further + far[j], SPARE * touch)
         if not _keeps_off(i, on, further, ways, far, keep, present):
             slow[i] = 0.0
-            if backs[i] and close:
-                astern = BACK * pace[i]
-                further = _way(on, position[i], velocity[i], rate[i], -facing[i], astern, brakes[i])
+            if close and np.any(astern[i] != 0.0):
+                back = BACK * pace[i]
+                further = _way(on, position[i], velocity[i], rate[i], astern[i], back, brakes[i])
                 keep[:] = SPARE * TOUCH * (reach[i] + reach)
                 if _keeps_off(i, on, further, ways, far, keep, present):
-                    slow[i], ways[i], far[i] = -astern, on, further
+                    slow[i], ways[i], far[i] = -back, on, further
         elif wanted > 0.0:
             ways[i], far[i] = on, further
     return near

@@ -107,6 +107,11 @@ class Squad(ABC):
         return self.tracks["aside"]
 
     @property
+    def goal(self) -> np.ndarray:
+        """(k, 3) metres: the place that the controllers hold; of those that steer by heading, where they are."""
+        return self.pose()[0]
+
+    @property
     def shifted(self) -> np.ndarray:
         """(k,) metres of `aside` that each has already moved: it follows what it is told with a lag."""
         return np.clip(-self.tracks["cross"], np.minimum(self.aside, 0.0), np.maximum(self.aside, 0.0))
@@ -273,6 +278,10 @@ class Multirotors(Squad):
     def pose(self) -> tuple[np.ndarray, np.ndarray]:
         w, a, b, c = self.state[:, multirotor.Q : multirotor.Q + 4].T
         return self.state[:, :3].copy(), np.arctan2(2 * (w * c + a * b), 1 - 2 * (b * b + c * c))
+
+    @property
+    def goal(self) -> np.ndarray:
+        return self.reference[:, :3]
 
     @property
     def shifted(self) -> np.ndarray:

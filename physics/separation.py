@@ -8,6 +8,8 @@ first.
 import numpy as np
 from numba import njit
 
+from quarterdeck.physics.braking import TOUCH
+
 HORIZON = 20.0  # s
 MEET = 0.6  # of the distance kept: how far each of two goes aside that meet head-on
 PASS = 1.25  # berths off one passes it
@@ -27,6 +29,7 @@ def give_way(
     offset: np.ndarray,
     rest: np.ndarray,
     keep: np.ndarray,
+    reach: np.ndarray,
     present: np.ndarray,
     place: np.ndarray,
     stands: np.ndarray,
@@ -42,10 +45,10 @@ def give_way(
     `position` (k, 3); `course` (k, 2) the level direction of the leg, `leg` (k, 3) that in space, zeros for one that lies
     still, `side` (k, 2) what is to starboard; `speed` (k,) over ground and `pace` (k,) as planned, m/s, 0 for one that is
     done; `aside` (k,) how far off its leg each has already gone for that, `offset` (k,) how far to starboard of it each is,
-    `rest` (k,) how far it has to the leg's end, metres; `keep` (k,) the distance kept; `present` (k,) those out there;
-    `place` (k,) in the order in which they go. One that `stands` (k,) too long passes by those that stand and come after
-    it, and obeys no other rule. Conflicts are looked for between the legs as planned, so that a vehicle stays aside until
-    the other is past.
+    `rest` (k,) how far it has to the leg's end, metres; `keep` (k,) the distance kept and `reach` (k,) half the hull's
+    diagonal, metres; `present` (k,) those out there; `place` (k,) in the order in which they go. One that `stands` (k,) too
+    long passes by those that stand and come after it, and obeys no other rule. Conflicts are looked for between the legs as
+    planned, so that a vehicle stays aside until the other is past.
     """
     for i in range(len(position)):
         slow[i], want[i], instead[i] = np.inf, 0.0, np.nan
@@ -69,7 +72,7 @@ def give_way(
                 aft = px * side[i, 0] + py * side[i, 1]  # to starboard
                 off = px * px + py * py + pz * pz - along * along - aft * aft
                 aft += offset[i]  # of the leg
-                berth = BERTH * apart
+                berth = max(BERTH * apart, 1.05 * TOUCH * (reach[i] + reach[j]))  # lest it has to brake
                 passing = -berth if aside[i] != 0.0 else 0.0  # aside until it is past
                 ahead = berth + min(max(speed[i], 0.25 * pace[i]) * HORIZON, rest[i])
                 room = WIDE * apart if np.any(leg[j] != 0.0) else berth

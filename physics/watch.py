@@ -20,6 +20,7 @@ WAITS = 8.0  # s that a vehicle stands for others before it goes around
 HELD = 60.0  # s after which one that stands says who lies in its way
 NEAR = 2.0  # of the distance kept: so near others may be what one stands for
 TURN = 40.0  # s that one of those who stand has to go around before it is another's turn
+CREEP = 0.25  # of its pace that one makes who has stood for long, or who is steeply aside
 AHEAD = 5.0  # s that one that is aside, or is to go there, looks ahead for room
 LAG = {"surface": 2.0, "ground": 0.3, "aerial": 0.5}  # s in which speed fades: of a vessel by its autopilot's gain
 
@@ -77,9 +78,11 @@ class Watch:
         offset = np.sum((position - start)[:, :2] * side, axis=1)
         to_go = np.linalg.norm(end - position, axis=1)
         give_way(
-            position, course, leg, side, speed, pace, aside, offset, to_go, self.keep, present, place, stands,
+            position, course, leg, side, speed, pace, aside, offset, to_go, self.keep, self.reach, present, place, stands,
             slow, want, instead,
         )  # fmt: skip
+        # Who was held sets out slowly: the slower, the shorter is its way to rest.
+        slow = np.where(stands & (self.slow <= CREEP * pace), np.minimum(slow, CREEP * pace), slow)
         for i in map(int, np.flatnonzero(((want != 0) | (aside != 0)) & going)):
             reach = course[i] * min(max(speed[i], 0.5 * pace[i]) * AHEAD, rest[i])
             sides = [w for w in (want[i], instead[i], aside[i], 0.0) if not np.isnan(w)]
@@ -88,19 +91,21 @@ class Watch:
             if not np.isnan(instead[i]) and want[i] not in sides[:2]:  # it can pass on neither side
                 slow[i] = 0.0
             if free is None:  # back to its path, as steeply as it can
-                slow[i] = min(slow[i], 0.25 * pace[i])
+                slow[i] = min(slow[i], CREEP * pace[i])
         # Vessels and rovers set out along the bow, aerial vehicles to where they want to be.
         level = np.column_stack([side * (want - aside)[:, None], np.zeros(count)])
         onward = 2 * self.length[:, None] * leg * ~(stands & (want != aside))[:, None]
+        onward += fleet.gather("goal") - position
         facing = np.where(self.aerial[:, None], onward + level, np.column_stack([bow, np.zeros(count)]))
         facing *= (going / np.maximum(np.linalg.norm(facing, axis=1), 1e-9))[:, None]
         passing = (want != 0) | (aside != 0) | ~np.isnan(instead)
-        backs = stands & passing
-        for i in map(int, np.flatnonzero(backs)):
-            backs[i] = self._has_room(i, position[i, :2], -0.5 * self.keep[i] * facing[i, :2], np.zeros(2))
+        astern = np.where(self.aerial[:, None], -leg, -np.column_stack([bow, np.zeros(count)]))
+        astern *= (stands & passing)[:, None]
+        for i in map(int, np.flatnonzero(stands & passing)):
+            astern[i] *= self._has_room(i, position[i, :2], 0.5 * self.keep[i] * astern[i, :2], np.zeros(2))
         slow = np.minimum(slow, fleet.gather("nearing"))
         self.wary = brake_in_time(
-            position, velocity, rate, facing, pace, self.reach, self.brakes, present, order, passing, backs, slow
+            position, velocity, rate, facing, pace, self.reach, self.brakes, present, order, passing, astern, slow
         )
         self.slow = slow
         for squad in fleet.squads:

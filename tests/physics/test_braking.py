@@ -10,15 +10,16 @@ from shapely import LineString
 from quarterdeck.physics.braking import TOUCH, _apart, brake_in_time
 
 NOBODY = np.zeros(2, bool)
+NOWHERE = np.zeros((2, 3))
 
 
-def _look(position, velocity, facing, *, passing=NOBODY, backs=NOBODY):
+def _look(position, velocity, facing, *, passing=NOBODY, astern=NOWHERE):
     """Return the speeds allowed to two vehicles of 1 m/s, half a metre of half diagonal, 1 m/s2 of brakes."""
     brakes = np.array([(1.0, 0.3, 5.0)] * 2)
     slow = np.full(2, np.inf)
     brake_in_time(
         np.array(position, float), np.array(velocity, float), np.zeros(2), np.array(facing, float), np.ones(2),
-        np.full(2, 0.5), brakes, np.ones(2, bool), np.arange(2), passing, backs, slow,
+        np.full(2, 0.5), brakes, np.ones(2, bool), np.arange(2), passing, astern, slow,
     )  # fmt: skip
     return slow
 
@@ -53,8 +54,9 @@ def test_one_that_backs_off_goes_astern():
     """Who faces another too near to go around goes astern, if told that there is room."""
     position, still = [(0.0, 0.0, 0.0), (0.9, 0.0, 0.0)], np.zeros((2, 3))
     facing = [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)]
-    both = np.array([True, False])
-    assert _look(position, still, facing, passing=both, backs=both)[0] < 0.0
+    one, away = np.array([True, False]), np.array([(-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)])
+    assert _look(position, still, facing, passing=one, astern=away)[0] < 0.0
+    assert _look(position, still, facing, passing=one, astern=-away)[0] == 0.0  # towards the other
 
 
 coordinate = st.floats(-10.0, 10.0).map(lambda v: round(v, 3))
