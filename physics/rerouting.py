@@ -231,7 +231,7 @@ class Rerouting:
         the command is `fresh`, and against what was found; when it has `stalled`, or stood still for STANDS, it looks for a
         way around the `others` too: of each the (q, 2) places where it is and is going. To a place where one stays it goes
         as near as it may. If there is no way, it makes room for them, the last in the list first, and comes back. Who makes
-        no map keeps to its waypoints, the next that it can reach first, and waits for as long as it takes.
+        no map keeps to its waypoints, from the next past the others on, and waits for as long as it takes.
         """
         vehicle, grid = self.vehicles[i], self._grid(i)
         stop = next((j for j, w in enumerate(command[done:], done) if _to_do(w)), len(command) - 1)
@@ -253,10 +253,13 @@ class Rerouting:
             free = free & _aside(grid, np.array([way[0] for way in others.values()]), self.room[i])
         # Who is nearer to a thing than the clearance goes to the nearest place that is not, as plans do.
         reach = vehicle.clearance + 2 * grid.resolution
-        for j in range(stop if self.looked else done, len(command)):
+        first = stop if self.looked else done + _past(here, command[done : stop + 1], others, float(self.room[i]))
+        for j in range(first, len(command)):
             goal = np.array([command[j].x, command[j].y])
             taken = any(len(way) == 1 and np.hypot(*(way[0] - goal)) < self.room[i] for way in others.values())
-            ends = nearest_free(grid, free, np.array([here, goal]), reach + self.room[i] * taken)
+            corner = j < stop  # which it need not be at
+            within = 2 * grid.resolution if corner else reach + self.room[i] * taken
+            ends = np.concatenate([nearest_free(grid, free, here, reach), nearest_free(grid, free, goal, within)])
             path = find_ways(grid, free, ends, "octile").path(0, 1)
             if path is not None:
                 path = path[1:] if np.hypot(*(path[0] - here)) < CELL and len(path) > 2 else path
@@ -360,6 +363,16 @@ class Rerouting:
 
 def _to_do(waypoint: Waypoint) -> bool:
     return waypoint.task is not None or waypoint.hold > 0 or waypoint.leg != "transit"
+
+
+def _past(here: np.ndarray, ahead: Sequence[Waypoint], others: Mapping[int, np.ndarray], room: float) -> int:
+    """Return the number of the waypoint at which one is past the `others` that are within `room` of its way from `here`."""
+    corners = np.array([here, *((w.x, w.y) for w in ahead)])
+    spots = shapely.points(np.array([way[0] for way in others.values()]).reshape(-1, 2))
+    nearest = shapely.distance(shapely.linestrings(np.stack([corners[:-1], corners[1:]], axis=1))[:, None], spots)
+    nearer = nearest < shapely.distance(shapely.Point(here), spots) - CELL  # within already, it may be getting away
+    beset = ((nearest < room) & nearer).any(axis=1)
+    return int(np.flatnonzero(beset & ~np.append(beset[1:], False))[0]) if beset.any() else 0
 
 
 def _same(waypoint: Waypoint, place: np.ndarray) -> bool:
