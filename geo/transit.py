@@ -11,8 +11,14 @@ from scipy.sparse.csgraph import dijkstra
 from shapely import LineString, MultiPolygon, Point
 from shapely.ops import nearest_points
 
+from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import as_multipolygon
+from quarterdeck.geo.triangulation import triangulate
+from quarterdeck.geo.visibility import visible_vertices
 
+MANY = 2_000  # corners: above it not every pair is looked at, which would take minutes and gigabytes
+BATCH = 256  # corners whose views are held at once
+MOST_LINKS = 8_000_000  # pairs of corners, of which a gigabyte becomes in the search for paths
 TOUCH = 1e-6  # m: how far a path may stray over an edge that it runs along
 
 
@@ -32,23 +38,67 @@ class Roadmap:
 
 
 def roadmap(polygon: MultiPolygon) -> Roadmap:
-    """Return the roadmap of a polygon, such as `Site.navigable`; only a reflex vertex can be a shortest path's corner."""
+    """Return the roadmap of a polygon, such as `Site.navigable`; only a reflex vertex can be a shortest path's corner.
+
+    Raises InputError if too many of them see each other to be held.
+    """
     polygon = without_chinks(polygon)
     rings = [shapely.get_coordinates(r) for p in shapely.orient_polygons(polygon).geoms for r in (p.exterior, *p.interiors)]
-    nodes, edges = [], []
+    nodes, beside, edges = [], [], []
     for ring in rings:
         here = ring[:-1]
         before, after = np.roll(here, 1, axis=0), np.roll(here, -1, axis=0)
         (ax, ay), (bx, by) = (here - before).T, (after - here).T
-        nodes.append(here[ax * by - ay * bx < 0])  # interior on the left: a right turn is reflex
+        reflex = ax * by - ay * bx < 0  # interior on the left: a right turn is
+        nodes.append(here[reflex])
+        beside.append(np.stack([before[reflex], after[reflex]]))
         edges.append(np.hstack([here, after]))
     corners = np.concatenate(nodes) if nodes else np.empty((0, 2))
     segments = np.concatenate(edges) if edges else np.empty((0, 4))
     grown = polygon.buffer(TOUCH)
     shapely.prepare(grown)
+    links = _pairs(corners, segments) if len(corners) <= MANY else _views(polygon, corners, np.concatenate(beside, axis=1))
+    return Roadmap(polygon, grown, corners, segments, links)
+
+
+def _pairs(corners: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Return the (l, 2) pairs of corners that see each other: every pair is looked at, past every edge."""
     first, second = np.triu_indices(len(corners), 1)
-    seen = _clear(corners[first], corners[second], segments)
-    return Roadmap(polygon, grown, corners, segments, np.column_stack([first[seen], second[seen]]))
+    seen = _clear(corners[first], corners[second], edges)
+    return np.column_stack([first[seen], second[seen]])
+
+
+def _views(polygon: MultiPolygon, corners: np.ndarray, beside: np.ndarray) -> np.ndarray:
+    """Return those of the pairs that shortest paths may use, by looking from each corner from triangle to triangle.
+
+    A path turns around a corner, so its links are tangents there: both neighbours on the ring, `beside` (2, n, 2), are on
+    one side. Raises InputError if there are too many.
+    """
+    mesh = triangulate(polygon.buffer(TOUCH, join_style="mitre"), corners)  # wider, for what one sees along walls
+    number = np.full(len(mesh.vertices), -1)
+    number[mesh.points] = np.arange(len(corners))
+    links, count = [], 0
+    for begin in range(0, len(corners), BATCH):
+        starts, seen = visible_vertices(mesh, corners[begin : begin + BATCH])
+        first, second = np.repeat(np.arange(begin, begin + len(starts) - 1), np.diff(starts)), number[seen]
+        kept = (second >= 0) & (second != first)
+        first, second = first[kept], second[kept]
+        way = corners[second] - corners[first]
+        tangent = _one_side(way, beside[:, first] - corners[first]) & _one_side(way, beside[:, second] - corners[second])
+        links.append(np.sort(np.column_stack([first[tangent], second[tangent]]), axis=1))
+        count += len(links[-1])
+        if count > 2 * MOST_LINKS:
+            raise InputError(
+                f"obstacles and borders have {len(corners):,} corners, between which too many ways are straight "
+                f"(more than {MOST_LINKS:,}); simplify their outlines, or plan what is far apart one by one"
+            )
+    return np.unique(np.concatenate(links), axis=0)
+
+
+def _one_side(way: np.ndarray, beside: np.ndarray) -> np.ndarray:
+    """Return (n,) bool: of (2, n, 2) `beside` both are on one side of (n, 2) `way`, but for rounding as in `_clear`."""
+    (a, b) = way[:, 0] * beside[:, :, 1] - way[:, 1] * beside[:, :, 0]
+    return np.asarray(~((a > 1e-6) & (b < -1e-6) | (a < -1e-6) & (b > 1e-6)))
 
 
 def without_chinks(polygon: MultiPolygon) -> MultiPolygon:

@@ -17,6 +17,8 @@ class Source(click.Path):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """Return the path as it was given. Raises InputError if nothing is there."""
+        if not value:
+            self.fail("there is no path; give that of a file", param, ctx)
         if value == "-" and not self.allow_dash:
             self.fail("standard input is not read here; give the path of a file", param, ctx)
         if value == "-" and sys.stdin.isatty():

@@ -1,11 +1,13 @@
 """Shortest paths around obstacles."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely import LineString, MultiPolygon, Point, box
+from shapely import LineString, MultiPolygon, Point, affinity, box
 from shapely.ops import unary_union
 
+from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import as_multipolygon
 from quarterdeck.geo.transit import roadmap, shortest_path, shortest_paths
 
@@ -40,6 +42,31 @@ def test_leaves_a_berth_inside_the_clearance():
     path = shortest_path(road, (-1.0, 5.0), (5.0, 5.0))
     assert path is not None
     assert np.allclose(path, [[-1, 5], [0, 5], [5, 5]], atol=1e-5)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_many_corners_give_the_same_ways_as_few(seed):
+    """Looking from triangle to triangle instead of at every pair changes no length; walls may be in line, and touch."""
+    rng = np.random.default_rng(seed)
+    corner, size = rng.integers(1, 17, (9, 2)), rng.integers(1, 4, (9, 2))
+    free = box(0, 0, 20, 20).difference(unary_union([box(*a, *b) for a, b in zip(corner, corner + size, strict=True)]))
+    free = affinity.rotate(free, float(rng.choice([0.0, 17.0])))
+    points = np.array([p for p in rng.uniform(0, 20, (30, 2)) if free.covers(Point(p))])[:4]
+    few = roadmap(as_multipolygon(free))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("quarterdeck.geo.transit.MANY", 0)
+        many = roadmap(as_multipolygon(free))
+    one, other = (shortest_paths(road, points, points)[0] for road in (few, many))
+    np.testing.assert_allclose(one, other, rtol=1e-9)
+
+
+def test_too_many_views_are_refused(monkeypatch):
+    """Corners that see each other in more pairs than can be held: one line with what helps."""
+    monkeypatch.setattr("quarterdeck.geo.transit.MANY", 0)
+    monkeypatch.setattr("quarterdeck.geo.transit.MOST_LINKS", 1)
+    with pytest.raises(InputError, match="4 corners, between which too many ways are straight"):
+        roadmap(as_multipolygon(box(-10, -10, 10, 10).difference(box(-2, -2, 2, 2))))
 
 
 blocks = st.lists(st.tuples(*[st.integers(1, 17)] * 2, *[st.integers(1, 4)] * 2), max_size=6)
