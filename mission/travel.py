@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.gridpath import Heuristic, Ways, find_ways, nearest_free
 from quarterdeck.geo.occupancy import Occupancy, site_occupancy
 from quarterdeck.geo.scenario import Scenario, Vehicle
@@ -15,6 +16,11 @@ from quarterdeck.mission.timing import turn_times
 
 CELLS = 1_000_000  # of a map that is made from a site, at most
 CELLS_A_CLEARANCE = 4
+BYTES_A_WAY, BYTES_A_TIME = (
+    250,
+    24,
+)  # of a pair of points: its path on each map; its time for each kind of vehicle
+MOST_BYTES = 1_200_000_000
 RIGHT_ANGLE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
 
 
@@ -59,9 +65,10 @@ def travel(
 
     A vehicle that turns on the spot is given a right angle's turn at each task, since its next leg is not known yet;
     `plain` times, the paper's, are metres along the grid over speed, no turns. `quick`: ways are found on the site's own
-    polygons instead of a map, in milliseconds.
+    polygons instead of a map, in milliseconds. Raises InputError if there are too many points for all ways to be held.
     """
     vehicles, n, k = scenario.vehicles, len(scenario.tasks), len(scenario.vehicles)
+    _refuse_too_many(scenario)
     points = np.array(
         [*(t.position for t in scenario.tasks), *(v.start for v in vehicles), *(v.home for v in vehicles)], dtype=float
     ).reshape(-1, 2)
@@ -71,7 +78,7 @@ def travel(
     kind = np.zeros(k, np.int64)
     seconds, turns, ways, off = [], [], [], []
     for r, v in enumerate(vehicles):
-        key = (v.domain, v.clearance, v.speed, v.turn_radius, v.model.name, v.altitude)
+        key = _class(v)
         if key not in kinds:
             kinds[key] = len(kinds)
             if (v.domain, v.clearance) not in known:
@@ -97,6 +104,23 @@ def travel(
         ways=tuple(ways),
         off=np.array(off).reshape(len(off), n),
     )
+
+
+def _refuse_too_many(scenario: Scenario) -> None:
+    n, k = len(scenario.tasks), len(scenario.vehicles)
+    maps, classes = ({f(v) for v in scenario.vehicles} for f in (lambda v: (v.domain, v.clearance), _class))
+    a_pair = BYTES_A_WAY * len(maps) + BYTES_A_TIME * len(classes)
+    if (n + 2 * k) ** 2 * a_pair > MOST_BYTES:
+        most = max(0, math.isqrt(MOST_BYTES // a_pair) - 2 * k)
+        raise InputError(
+            f"the ways between {n:,} tasks for {k:,} vehicles ({len(classes):,} that differ) are too many to hold; "
+            + (f"at most {most:,} tasks work" if most else "give fewer vehicles")
+        )
+
+
+def _class(v: Vehicle) -> tuple[object, ...]:
+    """Return what vehicles that drive alike have in common."""
+    return v.domain, v.clearance, v.speed, v.turn_radius, v.model.name, v.altitude
 
 
 def default_resolution(scenario: Scenario) -> float:

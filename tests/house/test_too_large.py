@@ -43,3 +43,23 @@ def test_too_fine_is_refused_with_what_works(case, tmp_path, capsys):
     assert not (tmp_path / "out.geojson").exists()
     assert time.process_time() - start < 20
     assert most < 500e6
+
+
+def test_too_many_tasks_are_refused_with_what_works(monkeypatch, capsys, tmp_path):
+    """The ways between all pairs are counted before any is looked for; as many tasks as are told are taken."""
+    monkeypatch.setattr("quarterdeck.mission.travel.MOST_BYTES", 20_000)
+    command = ["assign", str(DATA / "inspection_hall.geojson"), "--iterations", "1", "-o", str(tmp_path / "plan.geojson")]
+    with pytest.raises(SystemExit) as stop:
+        main(command)
+    assert stop.value.code == 2
+    assert "too many to hold; at most 4 tasks work" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("words", [["simulate", ""], ["plan", "x", "--terrain", ""]])
+def test_an_empty_path_is_refused(words, capsys):
+    """It would be the folder that one is in."""
+    with pytest.raises(SystemExit) as stop:
+        main(words)
+    assert stop.value.code == 2
+    assert "no path" in capsys.readouterr().err
