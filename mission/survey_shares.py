@@ -15,11 +15,11 @@ from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.remaining import clipped
 from quarterdeck.mission.routes import line_routes
 from quarterdeck.mission.sharing import Line, Shares, Team, line_of, share_out, team_of, times
-from quarterdeck.mission.timing import RESERVE, seconds_out, shortfalls
+from quarterdeck.mission.timing import seconds_out, shortfalls
 
 VISITED = 0.25  # spacings: a survey line is done where a track ran along it so near, and no piece is shorter
 ROUNDS = 2  # of sharing out again, once ways and turns are known
-CUTS = 20  # tries to fit routes into the energy left
+FINE, CRUMB = 0.005, 1.0  # of a vehicle's lines, and metres: its lines are cut so near to where its energy ends
 
 
 def urgent_first(
@@ -112,7 +112,7 @@ def shared(
     for _ in range(1 + ROUNDS):
         team = team_of(vehicles, paces, spent, limits)
         shares = _by_priority(team, classes, spacing)
-        survey, taken = _affordable(vehicles, shares, roads, paces)
+        survey, taken = _affordable(vehicles, shares, roads)
         if best is not None and survey.merit >= best.merit:
             break
         best = survey
@@ -172,41 +172,35 @@ def _by_priority(team: Team, classes: Sequence[tuple[list[list[Line]], list[Line
     return Shares(lines, shares.times, left)
 
 
-def _affordable(
-    vehicles: Sequence[Vehicle], shares: Shares, roads: Sequence[Roadmap], paces: np.ndarray
-) -> tuple[Survey, np.ndarray]:
-    """Return the routes along lines, each cut at its end until its vehicle has the energy for it; and the (k,) seconds that
+def _affordable(vehicles: Sequence[Vehicle], shares: Shares, roads: Sequence[Roadmap]) -> tuple[Survey, np.ndarray]:
+    """Return the routes along lines, each cut, by bisection, where the energy of its vehicle ends; and the (k,) seconds that
     they would take uncut.
     """
-    lines, left = [list(own) for own in shares.lines], list(shares.left)
-    taken = np.zeros(len(vehicles))
-    for attempt in range(CUTS):
-        routes, reasons = line_routes(vehicles, [[x.points for x in own] for own in lines], roads)
-        taken = taken if attempt else np.array([r.duration for r in routes])
-        poor = [i for i, (v, r) in enumerate(zip(vehicles, routes, strict=True)) if lines[i] and shortfalls(v, r)]
-        if not poor:
-            break
-        for i in poor:
-            metres = _excess(vehicles[i], routes[i]) / paces[i] if attempt < CUTS - 2 else np.inf
-            left += _dropped(lines[i], metres)
-    return Survey(routes, tuple(reasons), left), taken
+    whole = np.array([sum(x.length for x in own) for own in shares.lines])
+    keep, pays, fails = whole, np.zeros(len(vehicles)), whole
+    taken = None
+    while True:
+        cut = [_cut(own, metres) for own, metres in zip(shares.lines, keep.tolist(), strict=True)]
+        routes, reasons = line_routes(vehicles, [[x.points for x in kept] for kept, _ in cut], roads)
+        taken = np.array([r.duration for r in routes]) if taken is None else taken
+        poor = np.array([bool(c[0] and shortfalls(v, r)) for v, r, c in zip(vehicles, routes, cut, strict=True)])
+        pays, fails = np.where(poor, pays, keep), np.where(poor, keep, fails)
+        between = fails - pays > np.maximum(FINE * whole, CRUMB)
+        if not (poor | between).any():
+            return Survey(routes, tuple(reasons), [*shares.left, *(x for _, over in cut for x in over)]), taken
+        keep = np.where(between, (pays + fails) / 2, pays)
 
 
-def _excess(vehicle: Vehicle, route: Route) -> float:
-    """Return about how many seconds a route is too long for the energy and time that its vehicle has."""
-    over = 1.0 - seconds_out(vehicle) / max(route.duration, 1e-9)
-    return float(1.05 * max(over, 1.0 - (1 - RESERVE) * vehicle.battery / max(route.energy, 1e-9)) * route.duration)
-
-
-def _dropped(lines: list[Line], metres: float) -> list[Line]:
-    """Cut `metres` off the end of a vehicle's lines; return what is cut off."""
-    left: list[Line] = []
-    while lines and metres > 0:
-        last = lines.pop()
-        if last.length > metres + 1.0:
-            lines.append(last.part(0.0, last.length - metres))
-            left.append(last.part(last.length - metres, last.length))
-            break
-        left.append(last)
-        metres -= last.length
-    return left
+def _cut(lines: Sequence[Line], metres: float) -> tuple[list[Line], list[Line]]:
+    """Return the first `metres` of a vehicle's lines, and the rest."""
+    kept, rest = list[Line](), list[Line]()
+    for line in lines:
+        if metres > line.length - CRUMB:
+            kept.append(line)
+        elif metres < CRUMB:
+            rest.append(line)
+        else:
+            kept.append(line.part(0.0, metres))
+            rest.append(line.part(metres, line.length))
+        metres = max(0.0, metres - line.length)
+    return kept, rest
