@@ -173,8 +173,8 @@ def _by_priority(team: Team, classes: Sequence[tuple[list[list[Line]], list[Line
 
 
 def _affordable(vehicles: Sequence[Vehicle], shares: Shares, roads: Sequence[Roadmap]) -> tuple[Survey, np.ndarray]:
-    """Return the routes along lines, each cut, by bisection, where the energy of its vehicle ends; and the (k,) seconds that
-    they would take uncut.
+    """Return the routes along lines, each cut, by bisection, where the energy of its vehicle ends; and the (k,) seconds
+    that they would take uncut.
     """
     whole = np.array([sum(x.length for x in own) for own in shares.lines])
     keep, pays, fails = whole, np.zeros(len(vehicles)), whole
