@@ -11,13 +11,11 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from quarterdeck.physics.braking import LOOK
 from quarterdeck.physics.paths import HOLD, IDLE, ROTATE, SAIL
 
 ARRIVED = 1.0  # m: a vessel this near its waypoint has reached it
 CORNER = 0.3  # radians: a ground vehicle stops and turns on the spot at sharper corners
 CUT = 0.3  # m: how far inside a corner a multirotor may pass
-SIDEWAYS = 0.33  # of its speed: how fast one goes aside
 
 
 @njit(cache=True)
@@ -152,8 +150,8 @@ def guide_rovers(
                 turn[i] = min(max(3.0 * error, -lim.rate), lim.rate)
                 continue
         wanted = min(table[t.leg].speed, t.slow)
-        if _stops(t, table, time) or abs(_corner(t, table)) > CORNER:
-            wanted = min(wanted, max(np.sqrt(2 * 0.7 * lim.accel * max(length - along - near, 0.0)), 0.05))
+        rest = _to_stop(t, table, time, length - along, velocity[i] ** 2 / lim.accel)
+        wanted = min(wanted, max(np.sqrt(2 * 0.7 * lim.accel * max(rest - near, 0.0)), 0.05))
         ahead = max(0.5 * lim.length, 0.8 * abs(velocity[i]))
         bearing = _wrap(np.arctan2(ty * ahead - tx * cross, tx * ahead + ty * cross) - psi + t.bias)
         if abs(bearing) > (1.0 if t.slow > 0.0 else 0.1):  # pushed off its path, or held: face it first
@@ -233,9 +231,8 @@ def guide_multirotors(
             if np.hypot(dx, dy) > 0.1:
                 reference[i, 6] = np.arctan2(dy, dx)
             before, sin, cos = t.aside, np.sin(reference[i, 6]), np.cos(reference[i, 6])
-            # Here the shift is the motion: no faster than it gains in a look, and can stop.
-            most = min(LOOK * lim.accel, np.sqrt(lim.accel * abs(t.want - t.aside))) / SIDEWAYS
-            _step_aside(t, min(b.speed, max(t.slow, 0.0), most), step)
+            ends = 3.0 * np.sqrt(lim.accel * abs(t.want - t.aside))  # as fast as it can stop there
+            _step_aside(t, min(b.speed, max(t.slow, 0.0), ends), step)  # here the shift is the motion
             shift = (t.aside - before) / step
             reference[i, 0] += t.aside * sin
             reference[i, 1] -= t.aside * cos
@@ -253,8 +250,8 @@ def guide_multirotors(
 
 @njit(cache=True)
 def _step_aside(t: Any, speed: float, step: float) -> None:
-    """Move towards the offset that separation wants, at SIDEWAYS of `speed`."""
-    most = SIDEWAYS * speed * step
+    """Move towards the offset that separation wants, at a third of `speed`."""
+    most = 0.33 * speed * step
     t.aside += min(max(t.want - t.aside, -most), most)
 
 
@@ -307,6 +304,21 @@ def _corner(t: Any, table: np.ndarray) -> float:
 def _stops(t: Any, table: np.ndarray, time: float) -> bool:
     """Whether the vehicle comes to a stop at the end of the leg: to hold, to wait, or for good."""
     return t.leg >= t.last or table[t.leg].hold > 0 or table[min(t.leg + 1, t.last)].depart > time
+
+
+@njit(cache=True)
+def _to_stop(t: Any, table: np.ndarray, time: float, rest: float, far: float) -> float:
+    """Return the metres to where a rover next stops, `rest` of them on this leg; infinity if it does not within `far`."""
+    leg, stops = t.leg, False
+    while True:
+        stops = _stops(t, table, time) or abs(_corner(t, table)) > CORNER
+        if stops or rest > far:
+            break
+        t.leg += 1
+        a, b = table[t.leg - 1], table[t.leg]
+        rest += np.hypot(b.x - a.x, b.y - a.y)
+    t.leg = leg
+    return rest if stops else np.inf
 
 
 @njit(cache=True)

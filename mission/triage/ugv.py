@@ -14,6 +14,7 @@ from quarterdeck.mission.triage.records import XY, Report, Section, Uav, Ugv
 
 _REPORTING = ("deliver", "wait", "seek")
 _OUTSIDE = 3.0  # times as far from the rendezvous as its place there
+_DRIFT = 0.4  # m that a UAV with a body may hover off its place: who waits on the edge of its range is not heard
 
 
 def saw(desk: Desk, name: str, report: Report) -> None:
@@ -214,7 +215,8 @@ def stand_by(desk: Desk, name: str) -> None:
     here, speed = desk.here(name), desk.team.ugvs[name].speed
     soon = min(due(desk, s, me.board) for s in me.board)
     meeting = desk.policy.receiver == "uav" or desk.policy.everywhere  # elsewhere it will hear of nobody: a medic calls it
-    near = min(_length([here, d]) for d in desk.team.depots) <= desk.reach
+    hears = desk.reach - _DRIFT * (desk.team.ugvs[name].standoff > 0)
+    near = min(_length([here, d]) for d in desk.team.depots) <= hears
     hold = soon - desk.time if meeting and soon < inf else 0.0
     if (near and hold <= 0) or not ((meeting and soon < inf) or me.reports):
         desk.send(name, ())
