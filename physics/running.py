@@ -14,7 +14,6 @@ from quarterdeck.physics.faults import Fault, active, next_change
 from quarterdeck.physics.fleet import Fleet, Rovers
 from quarterdeck.physics.navigation import REACH
 from quarterdeck.physics.rerouting import Rerouting
-from quarterdeck.physics.rover import climb_parameters
 from quarterdeck.physics.sensing import Legs, Senses, Sensing
 from quarterdeck.physics.sightings import look_out
 from quarterdeck.physics.terrain import Footing
@@ -26,7 +25,6 @@ from quarterdeck.physics.world import INCONSISTENT, World
 DECIDE = 1.0  # s between calls of the director
 HARBOUR = 4.0  # lengths: so near its start or end a vehicle is being launched or recovered
 CRASH, SKID = 4.0, 0.5  # m/s down, and over the ground: a multirotor that meets it faster is out of the mission
-ASIDE = 50.0  # m about the ground routes in which PyBullet has the terrain
 UP = np.array([0.0, 0.0, 1.0])
 STUCK = 60.0  # s in contact, or down from the air, without a pause: the vehicle is given up
 
@@ -92,7 +90,8 @@ class Running:
         self.footing = Footing(vehicles)
         self.trouble: list[str] = []  # with the terrain
         if self.terrain is not None:
-            self._lay(self.terrain)
+            self.footing.lay(self.terrain, self.mission, self.fleet, self.world, self.position)
+            self._rise(self.terrain, self.position, self.heading)
         self.lookout = look_out(self.mission, self.terrain)
         if self.lookout is not None and self.router is None:  # people and robots find ways around who stands in theirs
             self.router = Rerouting(self.known, vehicles, np.flatnonzero(~self.aerial))
@@ -225,22 +224,6 @@ class Running:
             ground=self.footing.ground,
             pitch=self.footing.pitch,
         )
-
-    def _lay(self, terrain: Terrain) -> None:
-        """Lay the ground and stand the vehicles on it."""
-        for squad in self.fleet.squads:
-            if isinstance(squad, Rovers):
-                squad.climb = np.array([climb_parameters(v.model) for v in squad.vehicles])
-                self.footing.steepest[squad.index] = squad.climb["gradeability"]
-        rolling = self.footing.rolling
-        if rolling.any():
-            ways = [r.xyz[:, :2] for r in self.mission.routes if self.mission.vehicle(r.vehicle).domain == "ground"]
-            places = np.concatenate([self.position[rolling, :2], *ways])
-            (west, south), (east, north) = (places.min(axis=0) - ASIDE).tolist(), (places.max(axis=0) + ASIDE).tolist()
-            part = terrain.crop((west, south, east, north))
-            if part is not None:
-                self.world.add_terrain(part)
-        self._rise(terrain, self.position, self.heading)
 
     def _rise(self, terrain: Terrain, position: np.ndarray, heading: np.ndarray) -> np.ndarray:
         """Tilt the bodies to the ground at where the vehicles come to, and return how far it rises, (k,).

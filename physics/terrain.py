@@ -8,7 +8,11 @@ from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.mission import Mission
-from quarterdeck.physics.world import GAP, HEIGHT
+from quarterdeck.physics.fleet import Fleet, Rovers
+from quarterdeck.physics.rover import climb_parameters
+from quarterdeck.physics.world import GAP, HEIGHT, World
+
+ASIDE = 50.0  # m about the ground routes in which PyBullet has the terrain
 
 
 class Footing:
@@ -25,6 +29,23 @@ class Footing:
         self.size = np.array([(v.model.length, v.model.width) for v in vehicles])
         self.steepest = np.full(len(vehicles), np.inf)
         self.ground, self.pitch, self.roll, self.lift = (np.zeros(len(vehicles)) for _ in range(4))
+
+    def lay(self, terrain: Terrain, mission: Mission, fleet: Fleet, world: World, position: np.ndarray) -> None:
+        """Lay the ground about the ways of the rovers, now at `position` (k, 3), in the world, and say how steep they climb.
+
+        Raises InputError if PyBullet cannot hold so much of it.
+        """
+        for squad in fleet.squads:
+            if isinstance(squad, Rovers):
+                squad.climb = np.array([climb_parameters(v.model) for v in squad.vehicles])
+                self.steepest[squad.index] = squad.climb["gradeability"]
+        if self.rolling.any():
+            ways = [r.xyz[:, :2] for r in mission.routes if mission.vehicle(r.vehicle).domain == "ground"]
+            places = np.concatenate([position[self.rolling, :2], *ways])
+            (west, south), (east, north) = (places.min(axis=0) - ASIDE).tolist(), (places.max(axis=0) + ASIDE).tolist()
+            part = terrain.crop((west, south, east, north))
+            if part is not None:
+                world.add_terrain(part)
 
     def settle(self, terrain: Terrain, xy: np.ndarray, heading: np.ndarray) -> dict[int, str]:
         """Take over the ground at (k, 2) metres; return which vehicles cannot be there, and why.
