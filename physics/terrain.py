@@ -31,7 +31,7 @@ class Footing:
         self.ground, self.pitch, self.roll, self.lift = (np.zeros(len(vehicles)) for _ in range(4))
 
     def lay(self, terrain: Terrain, mission: Mission, fleet: Fleet, world: World, position: np.ndarray) -> None:
-        """Lay the ground about the ways of the rovers, now at `position` (k, 3), in the world, and say how steep they climb.
+        """Lay the ground about the ways of the rovers, now at `position` (k, 3), in the world; note how steep they climb.
 
         Raises InputError if PyBullet cannot hold so much of it.
         """

@@ -63,6 +63,21 @@ def test_crossing_the_one_with_the_other_to_starboard_lets_it_pass(sail):
     assert abs(trace.y[:, 1]).max() < 0.5  # and keeps its course
 
 
+@pytest.mark.parametrize("model", ["otter", "jackal", "survey-quad"])
+@pytest.mark.parametrize("off", [0.0, 1.9, 2.1, 2.3])
+def test_one_that_lies_still_is_passed_however_near_to_the_leg(sail, model, off):
+    """As many half diagonals off: no distance is too near for the brakes and too far to go around."""
+    kind = load_model(model)
+    reach, aside = 12.0 * kind.length, off * np.hypot(kind.length, kind.width) / 2
+    mission = sail(model, [(0.0, aside), (0.01, aside)], [(-reach, 0), (reach, 0)])
+    there = replace(mission.vehicles[0], end=(0.0, 10 * reach))  # far from home it is not taken out of the way
+    routes = tuple(replace(r, waypoints=tuple(w for w in r.waypoints if w.leg != "landing")) for r in mission.routes)
+    trace = simulate(replace(mission, vehicles=(there, mission.vehicles[1]), routes=routes), duration=300.0).trace
+    assert not trace.contact.any()
+    assert trace.x[-1, 1] > reach - kind.length
+    assert trace.time[-1] < 3.0 * 2 * reach / kind.speed + 20.0
+
+
 @pytest.mark.parametrize("model", ["otter", "husky", "survey-quad"])
 def test_who_finds_another_where_it_is_to_go_goes_on_from_beside_it(sail, model):
     """One is done and stays at the other's waypoint: the other comes as near as it can, and then home."""
