@@ -2,7 +2,6 @@
 
 import hashlib
 import math
-import sys
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -111,7 +110,7 @@ def _about_plan(folder: Path, document: dict[str, Any]) -> _About:
     if not isinstance(conditions, dict) or not isinstance(limits, dict):
         raise InputError("[conditions] and [limits] must be tables")
     _known(conditions, PLAN.names, "conditions.")
-    if any(isinstance(v, bool) or not isinstance(v, int | float) or abs(v) > sys.float_info.max for v in limits.values()):
+    if not all(is_number(v) or v == math.inf for v in limits.values()):
         raise InputError("[limits] must be numbers")
     check_limits(limits)
     mission = read_plan(folder / document["plan"])

@@ -74,6 +74,7 @@ def test_drawn_speeds_are_never_negative(study: Writer) -> None:
         ("[conditions]\nlidar = 'yes'", "true or false"),
         ("[conditions]\ngusts = []", "empty list"),
         ("[limits]\ncolisions = 1", "did you mean 'collisions'"),
+        ("[limits]\ncross_track = 1" + "0" * 400, "must be numbers"),
         ("[conditions", "not valid TOML"),
     ],
 )

@@ -119,7 +119,8 @@ def triage(rng: np.random.Generator, _: Files) -> Request:
         ["--rendezvous", "moving"],
     )
     data = damaged(name, _sites()[name], rng)
-    return _with_stdin(name, data, ["triage", "-o", "out/t.geojson", *extra, *odd], rng)
+    args = ["triage", "-o", "out/t.geojson", "--time-limit", "20"]  # dozens of UGVs at one point are minutes
+    return _with_stdin(name, data, [*args, *extra, *odd], rng)
 
 
 def simulate(rng: np.random.Generator, sound: Files) -> Request:
