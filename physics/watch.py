@@ -33,10 +33,10 @@ class Watch:
     def __init__(self, vehicles: Sequence[Vehicle], site: Site) -> None:
         count = len(vehicles)
         self.length = np.array([v.model.length for v in vehicles])
-        self.hull = np.array([[v.model.length, v.model.width] for v in vehicles])
+        width = np.array([v.model.width for v in vehicles])
         self.aerial = np.array([v.domain == "aerial" for v in vehicles])
         height = np.array([HEIGHT[v.domain] for v in vehicles]) * self.aerial  # others pass above and below
-        self.reach = np.linalg.norm([*self.hull.T, height], axis=0) / 2
+        self.reach = np.linalg.norm([self.length, width, height], axis=0) / 2
         self.keep = KEEP * np.maximum(self.length, SLIM * self.reach)
         self.brakes = np.array([(v.model.acceleration, LAG[v.domain], _surge(v)) for v in vehicles])
         margins = [(v.domain, TOUCH * v.model.width / 2) for v in vehicles]
@@ -58,8 +58,9 @@ class Watch:
     ) -> None:
         """Have vehicles give way to one another; one that has no room to go aside stays on its path.
 
-        Before what lies still on its path it stops, if it can pass on neither side. `position` (k, 3) metres, `heading`
-        (k,) radians, `velocity` (k, 3) m/s over ground, `rate` (k,) rad/s; `present` (k,) are those out there.
+        Before what lies still on its path it stops, if it can pass on neither side; if that lies where it was to go, it has
+        come as near as it may. `position` (k, 3) metres, `heading` (k,) radians, `velocity` (k, 3) m/s over ground, `rate`
+        (k,) rad/s; `present` (k,) are those out there.
         """
         count = len(position)
         slow, want, instead = (np.empty(count) for _ in range(3))
@@ -84,13 +85,14 @@ class Watch:
         # Who was held sets out slowly: the slower, the shorter is its way to rest.
         slow = np.where(stands & (self.slow <= CREEP * pace), np.minimum(slow, CREEP * pace), slow)
         for i in map(int, np.flatnonzero(((want != 0) | (aside != 0)) & going)):
-            reach = course[i] * min(max(speed[i], 0.5 * pace[i]) * AHEAD, rest[i])
-            sides = [w for w in (want[i], instead[i], aside[i], 0.0) if not np.isnan(w)]
-            free = next((w for w in sides if self._has_room(i, position[i, :2], reach, (w - aside[i]) * side[i])), None)
-            want[i] = 0.0 if free is None else free
-            if not np.isnan(instead[i]) and want[i] not in sides[:2]:  # it can pass on neither side
+            ahead = course[i] * min(max(speed[i], 0.5 * pace[i]) * AHEAD, rest[i])
+            sides = [w for w in (want[i], instead[i]) if not np.isnan(w)]
+            offsets = (*sides, aside[i], 0.0)
+            found = next((w for w in offsets if self._has_room(i, position[i, :2], ahead, (w - aside[i]) * side[i])), None)
+            want[i] = 0.0 if found is None else found
+            if len(sides) == 2 and want[i] not in sides:  # it can pass what lies still on neither
                 slow[i] = 0.0
-            if free is None:  # back to its path, as steeply as it can
+            if found is None:  # back to its path, as steeply as it can
                 slow[i] = min(slow[i], CREEP * pace[i])
         # Vessels and rovers set out along the bow, aerial vehicles to where they want to be.
         level = np.column_stack([side * (want - aside)[:, None], np.zeros(count)])
