@@ -15,9 +15,10 @@ from quarterdeck.geo.models import load_model
 from quarterdeck.geo.reader import read_obstacles, read_scenario
 from quarterdeck.geo.scenario import Obstacle, Precedence, Scenario, Site, Task, Vehicle
 from quarterdeck.mission.assign import assign
+from quarterdeck.mission.mission import Waypoint
 from quarterdeck.mission.recovery import recovering
 from quarterdeck.physics.lidar import beam_angles, cast, edge_grid
-from quarterdeck.physics.rerouting import Rerouting
+from quarterdeck.physics.rerouting import Rerouting, _past
 from quarterdeck.physics.sensing import Sensing
 from quarterdeck.physics.simulate import simulate
 
@@ -157,6 +158,16 @@ def test_two_that_meet_in_a_door_make_room():
     assert not run.report.figures["collisions"]
     assert all(v.finished for v in run.report.vehicles)
     assert run.trace.time[-1] < 200
+
+
+def test_the_way_leads_past_all_who_stand_not_to_a_corner_among_them():
+    """A corner near somebody is left out, and so are those up to where the legs are clear of all; a stop never is."""
+    ahead = [Waypoint(x, 0.0) for x in (1.0, 2.0, 3.0, 4.0, 5.0)]
+    here, others = np.zeros(2), {1: np.array([[2.5, 0.5]]), 2: np.array([[0.5, 7.0]])}
+    assert ahead[_past(here, ahead, others, 0.9)].x == 4.0
+    assert ahead[_past(here, ahead[:3], others, 0.9)].x == 3.0
+    assert _past(here, ahead, {2: others[2]}, 0.9) == 0
+    assert _past(np.array([2.6, 0.0]), ahead[3:], others, 0.9) == 0  # it is getting away
 
 
 def test_what_the_map_does_not_have_does_not_lead_the_filter_astray():

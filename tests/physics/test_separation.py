@@ -8,7 +8,7 @@ from shapely import MultiPolygon, box
 
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.models import load_model
-from quarterdeck.geo.scenario import Area, Scenario, Site, Task, Vehicle
+from quarterdeck.geo.scenario import Area, Obstacle, Scenario, Site, Task, Vehicle
 from quarterdeck.mission.assign import assign
 from quarterdeck.mission.mission import Route
 from quarterdeck.mission.recovery import recovering
@@ -93,6 +93,16 @@ def test_who_finds_another_where_it_is_to_go_goes_on_from_beside_it(sail, model)
     assert run.report.vehicles[1].finished
     assert run.report.figures["collisions"] == 0
     assert np.hypot(run.trace.x[:, 1] - reach, run.trace.y[:, 1]).min() < 2.5 * load_model(model).length
+
+
+def test_who_lies_beyond_a_leg_is_not_in_its_way(sail):
+    """Between walls that leave no room to pass, a rover goes to its place though another lies two metres past it."""
+    mission = sail("jackal", [(-10, 0), (0, 0)], [(8, 0.1), (2, 0)])
+    walls = tuple(Obstacle(f"wall {i}", box(-20, y, 20, y + 1)) for i, y in enumerate((-1.8, 0.8)))
+    vehicles = mission.vehicles[0], replace(mission.vehicles[1], end=None)  # whom nobody takes out of the way there
+    run = simulate(replace(mission, vehicles=vehicles, site=replace(mission.site, obstacles=walls)))
+    assert all(v.finished for v in run.report.vehicles)
+    assert run.trace.time[-1] < 30.0
 
 
 def test_separation_holds_while_replanning():

@@ -53,6 +53,12 @@ def test_holds_where_it_is_told_and_leaves_when_time_is_up(sail, model, near):
     assert 29.0 < trace.time[-1] - through.time[-1] < 50.0
 
 
+def test_a_rover_brakes_for_a_stop_beyond_a_mild_corner(sail):
+    """Just after a corner that it rounds at speed it turns on the spot: there, and not past it."""
+    trace = simulate(sail("jackal", [(0, 0), (20, 0), (20.2, -0.05), (5, -3)])).trace
+    assert 20.1 < trace.x[:, 0].max() < 20.25
+
+
 def test_vessel_at_half_power_turns_back_where_it_is(sail):
     """With one propeller of two at half power it waits at the end of a leg, then turns about in two lengths to go back."""
     mission = sail("otter", [(0, 0), (60, 0), (0, 0)])
