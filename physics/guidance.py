@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from quarterdeck.physics.braking import LOOK
 from quarterdeck.physics.paths import HOLD, IDLE, ROTATE, SAIL
 
 ARRIVED = 1.0  # m: a vessel this near its waypoint has reached it
 CORNER = 0.3  # radians: a ground vehicle stops and turns on the spot at sharper corners
 CUT = 0.3  # m: how far inside a corner a multirotor may pass
+SIDEWAYS = 0.33  # of its speed: how fast one goes aside
 
 
 @njit(cache=True)
@@ -231,8 +233,9 @@ def guide_multirotors(
             if np.hypot(dx, dy) > 0.1:
                 reference[i, 6] = np.arctan2(dy, dx)
             before, sin, cos = t.aside, np.sin(reference[i, 6]), np.cos(reference[i, 6])
-            ends = 3.0 * np.sqrt(lim.accel * abs(t.want - t.aside))  # as fast as it can stop there
-            _step_aside(t, min(b.speed, max(t.slow, 0.0), ends), step)  # here the shift is the motion
+            # Here the shift is the motion: no faster than it gains in a look, and can stop.
+            most = min(LOOK * lim.accel, np.sqrt(lim.accel * abs(t.want - t.aside))) / SIDEWAYS
+            _step_aside(t, min(b.speed, max(t.slow, 0.0), most), step)
             shift = (t.aside - before) / step
             reference[i, 0] += t.aside * sin
             reference[i, 1] -= t.aside * cos
@@ -250,8 +253,8 @@ def guide_multirotors(
 
 @njit(cache=True)
 def _step_aside(t: Any, speed: float, step: float) -> None:
-    """Move towards the offset that separation wants, at a third of `speed`."""
-    most = 0.33 * speed * step
+    """Move towards the offset that separation wants, at SIDEWAYS of `speed`."""
+    most = SIDEWAYS * speed * step
     t.aside += min(max(t.want - t.aside, -most), most)
 
 
