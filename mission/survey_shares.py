@@ -195,9 +195,9 @@ def _cut(lines: Sequence[Line], metres: float) -> tuple[list[Line], list[Line]]:
     """Return the first `metres` of a vehicle's lines, and the rest."""
     kept, rest = list[Line](), list[Line]()
     for line in lines:
-        if metres > line.length - CRUMB:
+        if metres > 0.0 and line.length <= metres + 1e-6:
             kept.append(line)
-        elif metres < CRUMB:
+        elif min(metres, line.length - metres) < CRUMB:
             rest.append(line)
         else:
             kept.append(line.part(0.0, metres))

@@ -9,8 +9,10 @@ import shapely
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.models import load_model
 from quarterdeck.geo.scenario import Area, Scenario, Site, Vehicle, as_multipolygon
-from quarterdeck.mission.cover import cover
+from quarterdeck.mission.cover import cover, roadmaps
 from quarterdeck.mission.lines import plan_lines
+from quarterdeck.mission.sharing import line_of
+from quarterdeck.mission.survey_shares import shared
 
 BORDER = 100.0  # m east: what is beyond is urgent
 
@@ -26,6 +28,11 @@ def scenario(shares, battery=None):
     fleet = [Vehicle(f"v{i}", model, (2.0 + 10 * i, -5.0), share=s, clearance=0.5) for i, s in enumerate(shares)]
     fleet = [replace(v, battery=battery or v.battery) for v in fleet]
     return Scenario("two areas", Frame(8.0, 54.0), site, tuple(fleet), spacing=5.0)
+
+
+def level(given):
+    """Return the scenario with areas of one priority."""
+    return replace(given, site=replace(given.site, areas=tuple(replace(a, priority=0) for a in given.site.areas)))
 
 
 def ways(mission):
@@ -44,10 +51,7 @@ def ways(mission):
 @pytest.mark.parametrize("shares", [(None,) * 3, (0.5, 0.3, 0.2)])
 def test_the_urgent_area_is_surveyed_first_and_as_much_is_covered(plan, shares):
     """Nobody comes back to the urgent area; without shares all take part in it; what is covered stays as it was."""
-    urgent = plan(scenario(shares))
-    site = urgent.site
-    level = replace(scenario(shares), site=replace(site, areas=tuple(replace(a, priority=0) for a in site.areas)))
-    plain = plan(level)
+    urgent, plain = plan(scenario(shares)), plan(level(scenario(shares)))
     east, west, late = ways(urgent).T
     assert urgent.feasible
     assert late.max() < 1.0
@@ -64,3 +68,23 @@ def test_a_plan_beyond_the_energy_leaves_nothing_out():
     assert not poor.feasible
     assert {r.kind for r in poor.reasons} == {"energy"}
     assert poor.figures["poc"] > 0.98
+
+
+@pytest.mark.parametrize("battery", [1e-3, 6.0, 12.0])
+def test_lines_are_cut_where_the_energy_ends_and_crumbs_too(battery):
+    """What is left out is what there is no energy for; even a crumb of a line goes where nothing can be paid."""
+    given = level(scenario((None,) * 3, battery))
+    roads = roadmaps(given)
+    able = np.ones(3, dtype=bool)
+    own = [
+        [line_of(np.array([[x, 2.0], [x, 2.0 + size]]), able) for x, size in ((5.0, 55.0), (10.0, 0.3), (15.0, 55.0))]
+    ] * 3
+    survey = shared(given, roads, own, [], np.full(3, 1.0), 5.0)
+    assert not survey.reasons
+    metres = sum(np.hypot(*np.diff(r.xyz[:, :2], axis=0).T)[r.survey[1:]].sum() for r in survey.routes)
+    assert metres + sum(x.length for x in survey.left) == pytest.approx(3 * 110.3, rel=1e-6)
+    if battery == 1e-3:
+        assert metres == 0.0
+    for vehicle, route in zip(given.vehicles, survey.routes, strict=True):
+        if survey.left and battery > 1.0:
+            assert route.energy > 0.9 * 0.8 * vehicle.battery
