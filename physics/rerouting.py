@@ -1,9 +1,8 @@
-"""What robots with lidar find that their map does not have, and their way around it.
+"""The ways of robots around what they found (`findings`) and around those who stand in their way.
 
-All robots that are in contact put what they see into one map; one that nobody hears goes on with its own copy, and what it
-saw counts when it is heard again. Where what was found bars the way ahead, a robot plans anew by A* to where it next has
-something to do. Where there is no way any more, it stops and says so. A triage team goes around those who stand in its way
-as robots with lidar do: who is in range of others' eyes needs none to be seen.
+Where what was found bars the way ahead, a robot plans anew by A* to where it next has something to do. Where there is no
+way any more, it stops and says so. A triage team goes around those who stand in its way as robots with lidar do: who is in
+range of others' eyes needs none to be seen.
 """
 
 from collections.abc import Container, Iterable, Mapping, Sequence
@@ -11,23 +10,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
-from scipy.ndimage import binary_dilation, distance_transform_edt
-from shapely import LineString, MultiPolygon
+from scipy.ndimage import distance_transform_edt
+from shapely import LineString
 
 from quarterdeck.geo.gridpath import find_ways, nearest_free
-from quarterdeck.geo.occupancy import FREE, Occupancy, site_occupancy
-from quarterdeck.geo.scenario import Site, Vehicle, as_multipolygon
+from quarterdeck.geo.occupancy import Occupancy
+from quarterdeck.geo.scenario import Site, Vehicle
 from quarterdeck.mission.director import Event
 from quarterdeck.mission.mission import Waypoint
 from quarterdeck.physics.braking import TOUCH
+from quarterdeck.physics.findings import CELL, Findings
 from quarterdeck.physics.fleet import Fleet
-from quarterdeck.physics.mapping import WALL, Evidence, fuse, no_evidence
 from quarterdeck.physics.paths import ROTATE, SAIL
 
-CELL = 0.1  # m
-KNOWN = 0.3  # m: echoes so near to what the map has are of that: walls are not quite where a robot believes them
 SLACK = 0.7  # of the clearance: a way that keeps this much of it from what was found is left as it is
-OTHERS = 0.5  # m about the hull of another robot in contact, whose echoes are no obstacle
 AGAIN = 10.0  # s between two attempts of a robot that gets no further
 LOOK = 5.0  # s for which it looks on before it says that there is no way
 PATIENCE = 60.0  # s without getting further, after which there is no way
@@ -52,27 +48,20 @@ class Detour:
 
 
 class Rerouting:
-    """The maps and detours of the robots `lidars` (n,), places among `vehicles`, on the `site` that their plan knows."""
+    """The detours of the `robots` (n,), places among `vehicles`, on the `site` that their plan knows."""
 
-    def __init__(self, site: Site, vehicles: Sequence[Vehicle], lidars: np.ndarray) -> None:
-        self.site, self.vehicles, self.lidars = site, vehicles, lidars
+    def __init__(self, site: Site, vehicles: Sequence[Vehicle], robots: np.ndarray) -> None:
+        self.site, self.vehicles, self.robots = site, vehicles, robots
+        self.findings = Findings(site, vehicles, robots)
         half = np.array([np.hypot(v.model.length, v.model.width) / 2 for v in vehicles])
-        self.room = ROOM * TOUCH * (half + half[lidars].max())
-        self.shared = no_evidence(site, CELL)
-        self.apart: dict[int, Evidence] = {}  # the maps of robots that are not heard
+        self.room = ROOM * TOUCH * (half + half[robots].max())
         self.detours: dict[int, Detour] = {}
         self.stalled = np.full(len(vehicles), np.inf)  # since when
-        self.anchor, self.since, self.last = (
-            np.full((len(vehicles), 2), np.inf),
-            np.zeros(len(vehicles)),
-            -np.ones(len(vehicles)),
-        )
+        self.anchor, self.since = np.full((len(vehicles), 2), np.inf), np.zeros(len(vehicles))
+        self.last = -np.ones(len(vehicles))
         self.tried = np.full(len(vehicles), -np.inf)
         self.barred = np.full(len(vehicles), np.inf)  # since when there is no way
         self.stuck: set[int] = set()  # those that have no way
-        self.strange = {-1: np.zeros((0, 0), bool)}  # of the common map (-1), and of those of robots that are not heard
-        self.free: dict[float, np.ndarray] = {}
-        self.looked = False  # somebody has: there is more to know than the plan does
 
     def begin(self, fresh: Iterable[int]) -> None:
         """Forget the detours of robots that have a fresh command."""
@@ -80,84 +69,6 @@ class Rerouting:
             self.detours.pop(i, None)
             self.stuck.discard(i)
             self.barred[i], self.stalled[i] = np.inf, np.inf
-
-    def look(
-        self,
-        believed: np.ndarray,
-        sure: np.ndarray,
-        angles: np.ndarray,
-        ranges: np.ndarray,
-        reach: float,
-        mute: np.ndarray,
-        present: np.ndarray,
-    ) -> None:
-        """Put the scans (n, b) of robots at `believed` (k, 3) on their maps.
-
-        Those that are not `sure` (k,) of their place add nothing. Echoes of robots that are `present` and not `mute` (k,)
-        are of no obstacle.
-        """
-        self.looked = True
-        for i in [i for i in self.apart if not mute[i]]:
-            seen = self.apart.pop(i).values
-            stronger = np.abs(seen) > np.abs(self.shared.values)
-            self.shared.values[stronger] = seen[stronger]
-        for i in np.intersect1d(np.flatnonzero(mute), self.lidars).tolist():
-            if i not in self.apart:
-                self.apart[i] = replace(self.shared, values=self.shared.values.copy())
-        size = np.array([np.hypot(v.model.length, v.model.width) / 2 + OTHERS for v in self.vehicles])
-        for n, i in enumerate(self.lidars.tolist()):
-            if not (sure[i] and present[i]):
-                continue
-            others = np.flatnonzero(present & ~mute)
-            others = others[others != i]
-            bearing, told = believed[i, 2] + angles, ranges[n].copy()
-            ends = believed[i, :2] + np.where(np.isfinite(told), told, 0.0)[:, None] * np.column_stack(
-                [np.cos(bearing), np.sin(bearing)]
-            )
-            away = np.hypot(*(ends[:, None] - believed[others, :2]).transpose(2, 0, 1))
-            told[(away < size[others]).any(axis=1)] = np.nan
-            fuse(self.map_of(i), believed[i], angles, told, reach)
-
-        self.strange = {-1: self._strange(self.shared), **{i: self._strange(e) for i, e in self.apart.items()}}
-
-    def _strange(self, evidence: Evidence) -> np.ndarray:
-        """Return (rows, cols) bool: the cell is of something that the plan's map does not have, or beside it."""
-        found = (evidence.values > WALL) & self._clear_of(KNOWN)
-        return binary_dilation(found, iterations=2) if found.any() else found
-
-    def mapped(self, believed: np.ndarray, angles: np.ndarray, ranges: np.ndarray) -> np.ndarray:
-        """Return the scans (n, b) without the echoes of what was found: a filter that believes the map had better not try
-        to explain them.
-        """
-        if not any(s.any() for s in self.strange.values()):
-            return ranges
-        out = ranges.copy()
-        for n, i in enumerate(self.lidars.tolist()):
-            strange, heard = self.strange.get(i, self.strange[-1]), np.flatnonzero(np.isfinite(ranges[n]))
-            bearing = believed[i, 2] + angles[heard]
-            ends = believed[i, :2] + ranges[n, heard, None] * np.column_stack([np.cos(bearing), np.sin(bearing)])
-            cells = np.floor(self._grid(i).to_cells(ends)).astype(int)
-            on = ((cells >= 0) & (cells < strange.shape)).all(axis=1)
-            hit = heard[on][strange[cells[on, 0], cells[on, 1]]]
-            out[n, hit] = np.inf
-        return out
-
-    def map_of(self, i: int) -> Evidence:
-        """Return the evidence that robot `i` has."""
-        return self.apart.get(i, self.shared)
-
-    def found(self, i: int) -> np.ndarray:
-        """Return (m, 2) metres: the centres of the cells where robot `i` knows of something that its map does not have."""
-        if not self.looked:
-            return np.zeros((0, 2))
-        cells = np.argwhere((self.map_of(i).values > WALL) & (self._clear_of(KNOWN)))
-        return self._grid(i).to_metres(cells + 0.5)
-
-    def _obstacles(self, i: int) -> MultiPolygon:
-        """Return what robot `i` has found as polygons in metres."""
-        half, at = 0.5 * self.shared.cell, self.found(i)
-        cells = shapely.box(at[:, 0] - half, at[:, 1] - half, at[:, 0] + half, at[:, 1] + half)
-        return as_multipolygon(shapely.union_all(cells).buffer(half, join_style="mitre").simplify(half))
 
     def drive_around(
         self,
@@ -179,7 +90,7 @@ class Rerouting:
         actual, mode = fleet.gather("reached"), fleet.gather("tracks")["mode"]
         there = there & np.array([v.domain == "ground" for v in self.vehicles])
         done = self.reached(actual)
-        for i in self.lidars.tolist():
+        for i in self.robots.tolist():
             command = commands[i]
             if done[i] >= len(command) or not present[i] or (mode[i] not in (SAIL, ROTATE) and i not in fresh):
                 continue
@@ -202,7 +113,7 @@ class Rerouting:
             if detour is not None and not detour.waypoints:
                 self.stuck.add(i)
                 x, y, _ = believed[i].tolist()
-                data = {"x": x, "y": y, "found": self._obstacles(i)}
+                data = {"x": x, "y": y, "found": self.findings.obstacles(i)}
                 stop, rest = command[detour.onward], command[detour.onward :]
                 task = next((w.task for w in rest if w.task and (w.x, w.y) == (stop.x, stop.y)), "")
                 events.append(Event("unreachable", self.vehicles[i].id, task, data))
@@ -233,12 +144,12 @@ class Rerouting:
         as near as it may. If there is no way, it makes room for them, the last in the list first, and comes back. Who makes
         no map keeps to its waypoints, from the next past the others on, and waits for as long as it takes.
         """
-        vehicle, grid = self.vehicles[i], self._grid(i)
+        vehicle, grid = self.vehicles[i], self.findings.grid(i)
         stop = next((j for j, w in enumerate(command[done:], done) if _to_do(w)), len(command) - 1)
         standing = self._standing(i, time, here)
         self.stalled[i] = min(self.stalled[i], time) if stalled else np.inf
         if stalled or standing >= STANDS:
-            if time > self.stalled[i] + PATIENCE or (standing > QUEUE and self.looked):
+            if time > self.stalled[i] + PATIENCE or (standing > QUEUE and self.findings.looked):
                 return Detour((), 0, stop, done)
             if time < self.tried[i] + AGAIN:
                 return None
@@ -246,14 +157,14 @@ class Rerouting:
         elif ahead[0].leg != "transit" or not self._barred(i, here, ahead, fresh=fresh or np.isfinite(self.barred[i])):
             self.barred[i] = np.inf
             return None
-        free = self._clear_of(vehicle.clearance) & _aside(grid, self.found(i), vehicle.clearance)
+        free = self.findings.clear_of(vehicle.clearance) & _aside(grid, self.findings.found(i), vehicle.clearance)
         stalled = stalled or standing >= STANDS
         if stalled and len(others):
             clear = free
             free = free & _aside(grid, np.array([way[0] for way in others.values()]), self.room[i])
         # Who is nearer to a thing than the clearance goes to the nearest place that is not, as plans do.
         reach = vehicle.clearance + 2 * grid.resolution
-        first = stop if self.looked else done + _past(here, command[done : stop + 1], others, float(self.room[i]))
+        first = stop if self.findings.looked else done + _past(here, command[done : stop + 1], others, float(self.room[i]))
         for j in range(first, len(command)):
             goal = np.array([command[j].x, command[j].y])
             taken = any(len(way) == 1 and np.hypot(*(way[0] - goal)) < self.room[i] for way in others.values())
@@ -293,7 +204,7 @@ class Rerouting:
 
         `clear` (rows, cols) are the cells without, `free` those with the others in them.
         """
-        vehicle, grid = self.vehicles[i], self._grid(i)
+        vehicle, grid = self.vehicles[i], self.findings.grid(i)
         # GEOS cannot segmentize a line of no length.
         ways = [LineString(w) if np.ptp(w, axis=0).any() else None for w in others]
         along = [
@@ -314,9 +225,8 @@ class Rerouting:
         out = find_ways(grid, free, nearest_free(grid, free, np.array([here, *chosen]), reach))
         best = int(np.argmin(out.lengths[0, 1:])) + 1
         way = out.path(0, best)
-        back = find_ways(grid, clear, nearest_free(grid, clear, np.array([chosen[best - 1], goal]), reach), "octile").path(
-            0, 1
-        )
+        ends = nearest_free(grid, clear, np.array([chosen[best - 1], goal]), reach)
+        back = find_ways(grid, clear, ends, "octile").path(0, 1)
         if way is None or back is None:
             return None
         waits = Waypoint(float(way[-1, 0]), float(way[-1, 1]), hold=YIELDS)
@@ -346,19 +256,8 @@ class Rerouting:
             leg, solid = LineString(points[:2]), [o.polygon for o in self.site.obstacles if "ground" in o.blocks]
             if shapely.dwithin(leg, solid, self.vehicles[i].model.width / 2).any():
                 return True
-        at = self.found(i)
+        at = self.findings.found(i)
         return bool(len(at)) and bool(shapely.dwithin(way, shapely.MultiPoint(at), keep))
-
-    def _clear_of(self, margin: float) -> np.ndarray:
-        """Return (rows, cols) bool: the cell keeps `margin` metres from what the plan's map has."""
-        if margin not in self.free:
-            made = site_occupancy(self.site, "ground", self.shared.cell, margin)
-            self.free[margin] = made.cells == FREE
-        return self.free[margin]
-
-    def _grid(self, i: int) -> Occupancy:
-        evidence = self.map_of(i)
-        return Occupancy(evidence.values, evidence.cell, evidence.origin)
 
 
 def _to_do(waypoint: Waypoint) -> bool:

@@ -318,7 +318,7 @@ class Running:
         if self.senses is not None and len(self.senses.lidars):
             believed, sure = self.senses.navigation.believed, self.senses.navigation.sure | self.sensing.mapping
             angles, ranges, mute = self.senses.angles, self.senses.ranges, self.suffering["comms"]
-            router.look(believed, sure, angles, ranges, REACH, mute, present)
+            router.findings.look(believed, sure, angles, ranges, REACH, mute, present)
         commands = [self.commands.get(id, ()) for id in self.ids]  # noqa: A001
         self.events += router.drive_around(self.time, self.fleet, believed, commands, fresh, self.stalled, present, there)
 

@@ -120,7 +120,7 @@ class Senses:
             ranges = self.ranges = noisy(clean, self.random, deviation=NOISE, dropout=DROPOUT, reach=REACH)
         told = ranges
         if ranges is not None and self.router is not None:
-            told = self.router.mapped(self.navigation.believed, self.angles, ranges)
+            told = self.router.findings.mapped(self.navigation.believed, self.angles, ranges)
         self.navigation.step(time, step, pose, deaf, self.angles, told)
         if ranges is not None:
             self._steer(step, pose, present, ranges, legs)

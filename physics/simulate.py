@@ -193,7 +193,7 @@ def simulate(
     )
     made = None
     if sensing.mapping and run.router is not None:
-        made = replace(run.router.shared.occupancy(), place=(mission.frame.lon, mission.frame.lat))
+        made = replace(run.router.findings.shared.occupancy(), place=(mission.frame.lon, mission.frame.lat))
         report = replace(report, figures={**report.figures, **agreement(made, mission.site)})
     return Run(trace, report, compared, mission.site, made, told)
 

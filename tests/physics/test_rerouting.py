@@ -17,8 +17,7 @@ from quarterdeck.geo.scenario import Obstacle, Precedence, Scenario, Site, Task,
 from quarterdeck.mission.assign import assign
 from quarterdeck.mission.mission import Waypoint
 from quarterdeck.mission.recovery import recovering
-from quarterdeck.physics.lidar import beam_angles, cast, edge_grid
-from quarterdeck.physics.rerouting import Rerouting, _past
+from quarterdeck.physics.rerouting import _past
 from quarterdeck.physics.sensing import Sensing
 from quarterdeck.physics.simulate import simulate
 
@@ -119,30 +118,6 @@ def test_who_is_shut_in_stays_and_says_so():
     assert "r1: found no way home" in run.report.reasons
     assert run.report.tasks[0].driven is not None
     assert not run.report.vehicles[0].finished
-
-
-def test_a_robot_that_is_not_heard_keeps_what_it_saw_until_it_is():
-    """Its own map has the door, the common one does not, until it is heard again."""
-    scenario = corridor(Task("valve", (15.0, 2.0)), robots=2)
-    real = edge_grid([*(o.polygon for o in scenario.site.obstacles), SOUTH.polygon])
-    router, angles = Rerouting(scenario.site, scenario.vehicles, np.array([0, 1])), beam_angles(180)
-    pose = np.array([[6.0, 2.0, 0.0], [2.0, 9.0, 0.0]])
-    ranges = cast(real, pose, angles, 30.0)
-    ranges[1] = np.inf
-    sure = present = np.ones(2, bool)
-
-    def look(mute):
-        for _ in range(3):
-            router.look(pose, sure, angles, ranges, 30.0, np.array([mute, False]), present)
-
-    look(True)
-    assert len(router.found(0)) > 5
-    assert not len(router.found(1))
-    ranges[:] = np.inf
-    look(False)
-    assert len(router.found(1)) > 5
-    assert np.allclose(router.found(1)[:, 0], 10.0, atol=0.2)
-    assert not len(Rerouting(scenario.site, scenario.vehicles, np.array([0])).found(0))
 
 
 def test_two_that_meet_in_a_door_make_room():
