@@ -14,6 +14,7 @@ HORIZON = 20.0  # s
 MEET = 0.6  # of the distance kept: how far each of two goes aside that meet head-on
 PASS = 1.25  # berths off one passes it
 BERTH = 0.45  # of the distance kept: how near one may pass what lies still; less than routes keep from wrecks
+CREEP = 0.25  # of its pace that one makes at the least who passes another by, or sets out after it stood for long
 WIDE = 0.8  # of the distance kept: how near one may pass what stands and wants to go on
 
 
@@ -63,7 +64,7 @@ def give_way(
             apart = 0.5 * (keep[i] + keep[j])
             px, py = position[j, 0] - position[i, 0], position[j, 1] - position[i, 1]
             pz = position[j, 2] - position[i, 2]
-            if np.hypot(px, py) > 2 * apart + (speed[i] + speed[j] + 0.25 * pace[i]) * HORIZON:
+            if np.hypot(px, py) > 2 * apart + (speed[i] + speed[j] + CREEP * pace[i]) * HORIZON:
                 continue
             still = speed[j] < 0.3 and (not np.any(leg[j] != 0.0) or (stands[i] and place[i] < place[j]))
             if still and np.any(leg[i] != 0.0):
@@ -74,7 +75,7 @@ def give_way(
                 aft += offset[i]  # of the leg
                 berth = max(BERTH * apart, 1.05 * TOUCH * (reach[i] + reach[j]))  # lest it has to brake
                 passing = -berth if aside[i] != 0.0 else 0.0  # aside until it is past
-                ahead = berth + min(max(speed[i], 0.25 * pace[i]) * HORIZON, rest[i])
+                ahead = berth + min(max(speed[i], CREEP * pace[i]) * HORIZON, rest[i])
                 room = WIDE * apart if np.any(leg[j] != 0.0) else berth
                 # In its way, or in that back to its leg.
                 between = min(aside[i], 0.0) - room < aft < max(aside[i], 0.0) + room
@@ -85,7 +86,7 @@ def give_way(
                     lack = 0.9 * berth - abs(aft - offset[i])
                     if lack > 0.0:  # not yet aside: no faster than it gets there
                         soon = 0.33 * (along - berth) / lack if along > berth else 0.0
-                        slow[i] = min(slow[i], pace[i] * (0.25 if stands[i] else max(soon, 0.25)))
+                        slow[i] = min(slow[i], pace[i] * (CREEP if stands[i] else max(soon, CREEP)))
                 continue
             if stands[i] or abs(pz) > apart:
                 continue

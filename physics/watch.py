@@ -10,7 +10,7 @@ from quarterdeck.geo.scenario import Site, Vehicle
 from quarterdeck.physics.braking import SPARE, TOUCH, brake_in_time
 from quarterdeck.physics.fleet import Fleet
 from quarterdeck.physics.paths import HOLD
-from quarterdeck.physics.separation import give_way
+from quarterdeck.physics.separation import CREEP, give_way
 from quarterdeck.physics.world import HEIGHT
 
 KEEP = 3.0  # lengths kept from other vehicles
@@ -20,7 +20,6 @@ WAITS = 8.0  # s that a vehicle stands for others before it goes around
 HELD = 60.0  # s after which one that stands says who lies in its way
 NEAR = 2.0  # of the distance kept: so near others may be what one stands for
 TURN = 40.0  # s that one of those who stand has to go around before it is another's turn
-CREEP = 0.25  # of its pace that one makes who has stood for long, or who is steeply aside
 AHEAD = 5.0  # s that one that is aside, or is to go there, looks ahead for room
 LAG = {"surface": 2.0, "ground": 0.3, "aerial": 0.5}  # s in which speed fades: of a vessel by its autopilot's gain
 
@@ -69,8 +68,7 @@ class Watch:
         pace = np.where(fleet.gather("idle"), 0.0, fleet.gather("pace"))
         going = present & (fleet.gather("tracks")["mode"] != HOLD) & (pace > 0.0)
         order, stood = self._stand(time, position, going, fleet.gather("tracks")["want"] != 0.0)
-        place = np.empty(count, int)
-        place[order] = np.arange(count)
+        place = np.argsort(order)
         stands = stood > WAITS
         start, end = fleet.gather("ends").transpose(1, 0, 2)
         leg = (end - start) * going[:, None] / np.maximum(np.linalg.norm(end - start, axis=1), 1e-9)[:, None]
@@ -131,15 +129,6 @@ class Watch:
         order[:standing] = np.roll(order[:standing], int(time // TURN))
         return order, stood
 
-    def held(self, time: float, position: np.ndarray, still: np.ndarray) -> list[tuple[int, int]]:
-        """Return who has stood for another `HELD` s, each with those `still` (k,) that are near."""
-        stood = time - self.since
-        pairs = []
-        for i in map(int, np.flatnonzero((stood >= HELD) & (stood % HELD < 1.0) & ~still)):
-            near = still & (np.linalg.norm(position - position[i], axis=1) < NEAR * self.keep[i])
-            pairs += [(i, int(j)) for j in np.flatnonzero(near)]
-        return pairs
-
     def _stop_short(
         self, fleet: Fleet, position: np.ndarray, end: np.ndarray, stands: np.ndarray, still: np.ndarray
     ) -> None:
@@ -154,6 +143,18 @@ class Watch:
     def _has_room(self, i: int, here: np.ndarray, ahead: np.ndarray, aside: np.ndarray) -> bool:
         """Return whether vehicle `i`, now `here`, can go `ahead`, and as many metres further `aside`, all (2,)."""
         return bool(self.room[i].contains(LineString([here, here + ahead, here + ahead + aside])))
+
+    def held(self, time: float, position: np.ndarray, still: np.ndarray) -> list[tuple[int, int]]:
+        """Return who has stood for another `HELD` s, each with those `still` (k,) that are near to its `position` (k, 3).
+
+        Asked once a second it tells of each once in `HELD`.
+        """
+        stood = time - self.since
+        pairs = []
+        for i in map(int, np.flatnonzero((stood >= HELD) & (stood % HELD < 1.0) & ~still)):
+            near = still & (np.linalg.norm(position - position[i], axis=1) < NEAR * self.keep[i])
+            pairs += [(i, int(j)) for j in np.flatnonzero(near)]
+        return pairs
 
 
 def _surge(vehicle: Vehicle) -> float:
