@@ -153,7 +153,7 @@ def guide_rovers(
                 continue
         wanted = min(table[t.leg].speed, t.slow)
         rest = _to_stop(t, table, time, length - along, velocity[i] ** 2 / lim.accel)
-        wanted = min(wanted, max(np.sqrt(2 * 0.7 * lim.accel * max(rest - near, 0.0)), 0.05))
+        wanted = min(wanted, _rover_nearing(lim.accel, max(rest - near, 0.0)))
         ahead = max(0.5 * lim.length, 0.8 * abs(velocity[i]))
         bearing = _wrap(np.arctan2(ty * ahead - tx * cross, tx * ahead + ty * cross) - psi + t.bias)
         if abs(bearing) > (1.0 if t.slow > 0.0 else 0.1):  # pushed off its path, or held: face it first
@@ -170,8 +170,14 @@ def nearing_rovers(limits: np.ndarray, tracks: np.ndarray, table: np.ndarray, re
     for i in range(len(tracks)):
         t = tracks[i]
         if t.leg >= t.last or table[t.leg].hold > 0 or abs(_corner(t, table)) > CORNER:
-            speed[i] = max(np.sqrt(2 * 0.7 * limits[i].accel * rest[i]), 0.05)
+            speed[i] = _rover_nearing(limits[i].accel, rest[i])
     return speed
+
+
+@njit(cache=True)
+def _rover_nearing(accel: float, rest: float) -> float:
+    """Return the speed, m/s, from which a rover comes to a stop within `rest` metres, with something to spare."""
+    return max(np.sqrt(2 * 0.7 * accel * rest), 0.05)
 
 
 @njit(cache=True)
