@@ -14,6 +14,7 @@ import numpy as np
 import shapely
 from scipy.stats import chi2
 
+from quarterdeck.geo.angles import wrap
 from quarterdeck.physics.amcl import (
     ALARM,
     Belief,
@@ -26,7 +27,6 @@ from quarterdeck.physics.amcl import (
     recover,
     resample,
     weigh_scan,
-    wrap,
 )
 from quarterdeck.physics.lidar import beam_angles, cast, edge_grid, noisy
 from quarterdeck.physics.likelihood import distance_field

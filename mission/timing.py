@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from quarterdeck.geo.angles import wrap
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.mission import Leg, Route, Waypoint
 from quarterdeck.mission.reason import Reason
@@ -73,7 +74,7 @@ def turn_times(vehicle: Vehicle, points: np.ndarray) -> np.ndarray:
     angle = np.zeros(len(points))
     moving = np.hypot(*step.T) > 0
     both = moving[:-1] & moving[1:]
-    angle[1:-1] = np.where(both, np.abs((np.diff(heading) + np.pi) % (2 * np.pi) - np.pi), 0.0)
+    angle[1:-1] = np.where(both, np.abs(wrap(np.diff(heading))), 0.0)
     return turn_seconds(vehicle, angle)
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from quarterdeck.geo.angles import wrap
 from quarterdeck.physics.lidar import EdgeGrid
 from quarterdeck.physics.likelihood import DistanceField, log_likelihoods, scan_information, spread_beams
 from quarterdeck.physics.relocate import anywhere, relocate
@@ -228,11 +229,6 @@ def weakest(pose: np.ndarray, field: DistanceField, angles: np.ndarray, ranges: 
     position = told[:2, :2] - np.outer(told[:2, 2], told[2, :2]) / told[2, 2]  # what is left when the heading is not known
     least = float(np.linalg.eigvalsh(position)[0])
     return 1 / math.sqrt(least) if least > 1e-12 else math.inf
-
-
-def wrap(angle: np.ndarray) -> np.ndarray:
-    """Return angles in [-pi, pi)."""
-    return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
 def _reweighed(weights: np.ndarray, told: np.ndarray) -> np.ndarray:

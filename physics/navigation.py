@@ -7,6 +7,7 @@ from itertools import groupby
 
 import numpy as np
 
+from quarterdeck.geo.angles import wrap
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.physics.amcl import (
     ALARM,
@@ -22,7 +23,6 @@ from quarterdeck.physics.amcl import (
     weigh_fix,
     weigh_heading,
     weigh_scan,
-    wrap,
 )
 from quarterdeck.physics.lidar import EdgeGrid
 from quarterdeck.physics.likelihood import DistanceField

@@ -8,6 +8,7 @@ import numpy as np
 from shapely.geometry.base import BaseGeometry
 
 from quarterdeck.coverage.metrics import uncovered
+from quarterdeck.geo.angles import wrap
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.matching import Followed, follow, off_legs
@@ -220,7 +221,7 @@ def _wheeled_over(vehicle: Vehicle, route: Route, leg: np.ndarray, xy: np.ndarra
     limits = vehicle_limits([vehicle])[0]
     step = np.diff(route.xyz[:, :2], axis=0)
     length, course = np.hypot(*step.T), np.arctan2(step[:, 1], step[:, 0])
-    half = np.abs((np.diff(course) + np.pi) % (2 * np.pi) - np.pi) / 2
+    half = np.abs(wrap(np.diff(course))) / 2
     radius = max(limits["speed"] / limits["rate"], limits["radius"])
     turn = radius * np.minimum(np.tan(np.minimum(half, 1.5)), 2.0) + 0.5 * limits["speed"] * np.minimum(2 * half, 1.0)
     stops = np.array([w.hold > 0 for w in route.waypoints])

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from quarterdeck.geo.angles import wrap
+
 
 @dataclass(frozen=True, slots=True)
 class OdometryModel:
@@ -53,7 +55,7 @@ COMPASS = math.radians(1.0)  # deviation of a heading fix, white
 
 def body_motion(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Return (k, 3) what lies between poses (k, 3) as a vehicle feels it: metres ahead, to port, radians turned."""
-    turned = (after[:, 2] - before[:, 2] + np.pi) % (2 * np.pi) - np.pi
+    turned = wrap(after[:, 2] - before[:, 2])
     middle = before[:, 2] + turned / 2
     dx, dy = (after[:, :2] - before[:, :2]).T
     cos, sin = np.cos(middle), np.sin(middle)
@@ -64,7 +66,7 @@ def add_motion(pose: np.ndarray, motion: np.ndarray) -> np.ndarray:
     """Return (k, 3) poses after (k, 3) motions as `body_motion` tells them."""
     middle = pose[:, 2] + motion[:, 2] / 2
     cos, sin = np.cos(middle), np.sin(middle)
-    heading = (pose[:, 2] + motion[:, 2] + np.pi) % (2 * np.pi) - np.pi
+    heading = wrap(pose[:, 2] + motion[:, 2])
     return np.column_stack(
         [
             pose[:, 0] + cos * motion[:, 0] - sin * motion[:, 1],
@@ -151,11 +153,11 @@ def correct(
     noise = np.diag(deviation[measured] ** 2)
     innovation = (told - pose)[:, measured]
     if measured[2]:
-        innovation[:, -1] = (innovation[:, -1] + np.pi) % (2 * np.pi) - np.pi
+        innovation[:, -1] = wrap(innovation[:, -1])
     rows = covariance[:, measured]
     gain = np.linalg.solve(rows[:, :, measured] + noise, rows).transpose(0, 2, 1)
     better = pose + np.einsum("kij,kj->ki", gain, innovation)
-    better[:, 2] = (better[:, 2] + np.pi) % (2 * np.pi) - np.pi
+    better[:, 2] = wrap(better[:, 2])
     surer = covariance - gain @ rows
     surer = (surer + surer.transpose(0, 2, 1)) / 2
     return np.where(seen[:, None], better, pose), np.where(seen[:, None, None], surer, covariance)

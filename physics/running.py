@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from quarterdeck.geo.angles import wrap
 from quarterdeck.geo.scenario import Obstacle, Site
 from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.director import Command, Director, Event, State, wake_time
@@ -121,7 +122,7 @@ class Running:
             squad.drive(step, self.current, wind[squad.index])
         position, heading = self.fleet.poses()
         velocity = (position - self.position) / step
-        rate = ((heading - self.heading + np.pi) % (2 * np.pi) - np.pi) / step
+        rate = wrap(heading - self.heading) / step
         rise = self._rise(self.terrain, position, heading) / step if self.terrain is not None else np.zeros(self.count)
         touched = self.world.advance(velocity + rise[:, None] * UP, rate)
         self.contact[:] = False

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from quarterdeck.geo.angles import wrap
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Obstacle, Site, Vehicle
 from quarterdeck.physics.lidar import beam_angles, cast, edge_grid, noisy
@@ -186,7 +187,7 @@ class Senses:
         )
         turn = np.where(pace > 0.02, np.arctan2(wanted[:, 1], wanted[:, 0]) - pursued, 0.0)
         act = near & moving
-        self.bias[n[act]] = ((turn + np.pi) % (2 * np.pi) - np.pi)[act]
+        self.bias[n[act]] = wrap(turn)[act]
         self.slow[n[act]] = pace[act]
         self.slow[n[moving]] = np.minimum(self.slow[n], safe_speed(self.angles, ranges, self.hull))[moving]
         fresh = self.leg[n] != legs.number[n]
