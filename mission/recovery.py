@@ -33,9 +33,7 @@ from quarterdeck.mission.triage.plan import METHOD
 
 BERTH = 4.0  # lengths from its end: so near, whoever launches and recovers the vehicles clears the way
 COASTS = 2.0  # s at its speed that a vehicle may have gone on from where it was heard last
-DRIFTED = (
-    0.5  # lengths that one who was given up is off where it is thought to be, for which a new plan is worth its trouble
-)
+DRIFTED = 0.5  # lengths from where one who was given up is thought to lie: only farther off is it worth a new plan
 Tell = Callable[[float, Mission], None]
 
 
@@ -294,22 +292,19 @@ def _telling(now: _Memory, time: float, state: State, route: Route, plan: Missio
 
 def tellings(memory: Any) -> tuple[Telling, ...]:
     """Return the new routes that the director with this `memory` has told vehicles in a run, in order."""
-    if isinstance(memory, Contact):
-        return tellings(memory.inner)
+    memory = _unwrapped(memory)
     return memory.tellings if isinstance(memory, _Memory) else ()
 
 
 def relieved(memory: Any) -> dict[str, Telling]:
     """Return of each vehicle that was given up how far it had come when its part was given to others."""
-    if isinstance(memory, Contact):
-        return relieved(memory.inner)
+    memory = _unwrapped(memory)
     return dict(memory.reliefs) if isinstance(memory, _Memory) else {}
 
 
 def left_out(memory: Any) -> tuple[Reason, ...]:
     """Return what the last plan told, by a director that replans, said of what can't be done any more."""
-    if isinstance(memory, Contact):
-        return left_out(memory.inner)
+    memory = _unwrapped(memory)
     return memory.mission.reasons if isinstance(memory, _Memory) and memory.tellings else ()
 
 
@@ -333,14 +328,18 @@ def asked_for(mission: Mission, wishes: Sequence[Changes]) -> Mission:
 
 def undone(memory: Any) -> tuple[Reason, ...]:
     """Return what a director's `memory` says will not be done, and why."""
-    if isinstance(memory, Contact):
-        return undone(memory.inner)
+    memory = _unwrapped(memory)
     if isinstance(memory, _Memory):
         return tuple(dict.fromkeys((*memory.undone, *undone(memory.inner))))
     if isinstance(memory, Inspected):
         told = [Reason(why, "undone", task) for task, why in memory.abandoned.items()]
         return (*told, *(Reason("found no way home", "end", vehicle) for vehicle in sorted(memory.stranded)))
     return ()
+
+
+def _unwrapped(memory: Any) -> Any:
+    """Return the memory of the director that decides, without what `contact` adds to it."""
+    return memory.inner if isinstance(memory, Contact) else memory
 
 
 def _found(found: list[MultiPolygon]) -> tuple[Obstacle, ...]:
@@ -361,6 +360,6 @@ def _wreck(first: Mission, lost: str, working: set[str], states: Mapping[str, St
     hull = 0.5 * float(np.hypot(length, vehicle.model.width))
     free = min((here.distance(Point(states[v].x, states[v].y)) for v in working), default=inf)
     radius = min(hull + COASTS * vehicle.speed, 0.9 * free)
-    return (
-        Obstacle(f"wreck of {lost}", here.buffer(radius, quad_segs=4), frozenset({vehicle.domain})) if radius > 0 else None
-    )
+    if radius <= 0:
+        return None
+    return Obstacle(f"wreck of {lost}", here.buffer(radius, quad_segs=4), frozenset({vehicle.domain}))
