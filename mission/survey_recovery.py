@@ -94,7 +94,8 @@ def _undone(
     mission: Mission, scenario: Scenario, progress: Progress, changes: Changes
 ) -> tuple[list[tuple[str | None, list[np.ndarray]]], list[np.ndarray]]:
     """Return the (n, 2) lines still to be driven, by whose they are, and those that something new may have cut."""
-    short = VISITED * float(mission.spacing or 0.0)
+    spacing = float(mission.spacing or 0.0)
+    short = VISITED * spacing
     every = [(r.vehicle, run) for r in mission.routes for run in unbroken(r.xyz[:, :2], r.survey)]
     every += [(None, np.array(line.coords)) for line in mission.left_out]  # type: ignore[misc]
     parts = remaining_parts([run for _, run in every], progress.tracks, short)
@@ -102,7 +103,7 @@ def _undone(
     if not (changes.obstacles or changes.withdrawn):
         return undone, []  # type: ignore[return-value]
     try:
-        reach = as_multipolygon(trackable(scenario, float(mission.spacing or 0.0)).buffer(4 * short * 1e-6))
+        reach = as_multipolygon(trackable(scenario, spacing).buffer(1e-6 * spacing))
     except InputError:  # nothing is left to cover
         reach = MultiPolygon()
     return [(owner, clipped(left, reach, short)) for owner, left in undone], [x for _, left in undone for x in left]

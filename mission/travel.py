@@ -16,10 +16,8 @@ from quarterdeck.mission.timing import turn_times
 
 CELLS = 1_000_000  # of a map that is made from a site, at most
 CELLS_A_CLEARANCE = 4
-BYTES_A_WAY, BYTES_A_TIME = (
-    250,
-    24,
-)  # of a pair of points: its path on each map; its time for each kind of vehicle
+BYTES_A_WAY = 250  # for each pair of points: its path on a map
+BYTES_A_TIME = 24  # for each pair of points: its time for a kind of vehicle
 MOST_BYTES = 1_200_000_000
 RIGHT_ANGLE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
 
@@ -108,7 +106,7 @@ def travel(
 
 def _refuse_too_many(scenario: Scenario) -> None:
     n, k = len(scenario.tasks), len(scenario.vehicles)
-    maps, classes = ({f(v) for v in scenario.vehicles} for f in (lambda v: (v.domain, v.clearance), _class))
+    maps, classes = {(v.domain, v.clearance) for v in scenario.vehicles}, {_class(v) for v in scenario.vehicles}
     a_pair = BYTES_A_WAY * len(maps) + BYTES_A_TIME * len(classes)
     if (n + 2 * k) ** 2 * a_pair > MOST_BYTES:
         most = max(0, math.isqrt(MOST_BYTES // a_pair) - 2 * k)

@@ -21,8 +21,9 @@ from quarterdeck.geo.scenario import as_multipolygon
 from quarterdeck.mission.triage.chase import Ways
 from quarterdeck.mission.triage.records import XY
 
+MOST_CELLS = 500_000  # of the field's box: what sensors see along so long a path is still worked out in seconds
 _SEEN = 0.99  # of the sensing range counts: round ends of a track's swath are drawn with corners
-_ROUNDS = 4
+_ROUNDS = 4  # of visiting what is still missed; three times as many in what is left of a field
 _SPECK = 1e-3  # of the sensing range's square: nobody lies hidden in less
 
 
@@ -32,9 +33,6 @@ class Search:
 
     paths: tuple[np.ndarray, ...]
     missed: float
-
-
-MOST_CELLS = 500_000  # of the field's box: what sensors see along so long a path is still worked out in seconds
 
 
 @lru_cache(maxsize=64)
