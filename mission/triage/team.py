@@ -57,14 +57,12 @@ class Robot:
 
 @dataclass(frozen=True, slots=True)
 class Team:
-    """Who works on a site, and how they get about. `medics` are starts by id; `ground`, `foot`
-    and `air` are where UGVs, medics and UAVs may be.
+    """Who works on a site, and how they get about.
 
-    `stand` is how far the mission had come before; `paces` are speeds of medics in m/s, where they are not the settings'.
-
-    `depots` are where spare devices for medics are, and where who has nobody to report to comes: the rendezvous or, without
-    any, where medics start. `distances` gives the medics' (n, n) metres between (n, 2) points; `on_ground`, `on_foot` and
-    `in_air` shortest paths.
+    `medics` are starts by id; `ground`, `foot` and `air` are where UGVs, medics and UAVs may be. `stand` is how far the
+    mission had come before; `paces` are speeds of medics in m/s, where they are not the settings'. `depots` are where spare
+    devices for medics are, and where who has nobody to report to comes: the rendezvous or, without any, where medics start.
+    `distances` gives the medics' (n, n) metres between (n, 2) points; `on_ground`, `on_foot` and `in_air` shortest paths.
     """
 
     ugvs: Mapping[str, Robot]
