@@ -26,12 +26,12 @@ class Request:
 Files = Mapping[str, bytes]
 Target = Callable[[np.random.Generator, Files], Request]  # the files are those of SOUND
 
-SOUND = {  # PLANs and what comes of them, each made of those before it
-    "stc.geojson": ["plan", "site.geojson", "--method", "stc"],
-    "lines.geojson": ["plan", "site.geojson", "--method", "lines", "--run", "4"],
-    "guards.geojson": ["plan", "site.geojson", "--method", "guards", "--range", "25"],
-    "tasks.geojson": ["assign", "site.geojson", "--iterations", "2"],
-    "report.json": ["simulate", "stc.geojson", "--json"],
+SOUND = {  # PLANs and what comes of them, each made of those before it by a command line that ends where it goes
+    "stc.geojson": ["plan", "site.geojson", "--method", "stc", "-o"],
+    "lines.geojson": ["plan", "site.geojson", "--method", "lines", "--run", "4", "-o"],
+    "guards.geojson": ["plan", "site.geojson", "--method", "guards", "--range", "25", "-o"],
+    "tasks.geojson": ["assign", "site.geojson", "--iterations", "2", "-o"],
+    "report.json": ["simulate", "stc.geojson", "--report"],
     "trace.npz": ["simulate", "stc.geojson", "--trace"],
 }
 
@@ -40,10 +40,7 @@ def make_sound(run: Callable[..., dict]) -> dict[str, bytes]:
     """Return the files of SOUND, made by the command line; `run` is a worker's."""
     made: dict[str, bytes] = {}
     for name, args in SOUND.items():
-        last = [] if args[-1] == "--json" else [f"out/{name}"] if args[-1] == "--trace" else ["-o", f"out/{name}"]
-        if args[-1] == "--json":
-            args, last = args[:-1], ["--report", f"out/{name}"]
-        told = run({"site.geojson": small_site()} | made, [*args, *last], want=f"out/{name}")
+        told = run({"site.geojson": small_site()} | made, [*args, f"out/{name}"], want=f"out/{name}")
         if told["broken"] or not told["made"]:
             raise RuntimeError(f"{name}: {told}")
         made[name] = told["made"]
@@ -212,23 +209,8 @@ def replay(rng: np.random.Generator, sound: Files) -> Request:
 
 
 VERBS = ["check", "plan", "assign", "triage", "simulate", "replan", "export", "chart", "campaign", "reproduce", "init"]
-WORDS = [
-    "--help",
-    "--force",
-    "--to",
-    "--spacing",
-    "--at",
-    "-o",
-    "--json",
-    "--seed",
-    "--draught",
-    "--method",
-    "--fail",
-    "site.geojson",
-    "stc.geojson",
-    "out",
-]
-WORDS += ["out/x/y.geojson", "sea", "harbour", "guards", "no such", *ODD]
+WORDS = ["--help", "--force", "--to", "--spacing", "--at", "-o", "--json", "--seed", "--draught", "--method", "--fail"]
+WORDS += ["site.geojson", "stc.geojson", "out", "out/x/y.geojson", "sea", "harbour", "guards", "no such", *ODD]
 
 
 def arguments(rng: np.random.Generator, sound: Files) -> Request:
