@@ -92,8 +92,12 @@ def _linked(vehicle: Vehicle, lines: Sequence[np.ndarray], road: Roadmap) -> tup
     clear = straight(road, np.array(ends[:-1]), np.array([line[0] for line in lines])) if lines else np.empty(0)
     for line, end, seen in zip(lines, ends, clear.tolist(), strict=False):
         here = points[-1][-1]
-        direct = seen and (here == end).all()
-        way = np.array([here, line[0]]) if direct else shortest_paths(road, here, line[0])[1][0][0]
+        if (here == line[0]).all():  # it goes on where the one before it ends
+            way = here[None]
+        elif seen and (here == end).all():
+            way = np.array([here, line[0]])
+        else:
+            way = shortest_paths(road, here, line[0])[1][0][0]
         if way is None:
             missing.append(
                 Reason(f"{vehicle.id}: no way from its start to its region; move the start, or lessen its clearance")
