@@ -28,13 +28,18 @@ def passed(route: Route, way: Sequence[Waypoint], reached: int) -> int:
 
     The way is a part of the route; it may come to a place, and serve there, by two waypoints. The start is always passed.
     """
-    places, goals = ([(w.x, w.y, w.z) for w in ws] for ws in (route.waypoints, way))
-    last, end = ([i for i, p in enumerate(ps) if ps[i + 1 : i + 2] != [p]] for ps in (places, goals))  # of each place
-    ahead, behind = [goals[i] for i in end], sum(i < reached for i in end)
-    for first in range(len(last)):
-        if [places[i] for i in last[first : first + len(ahead)]] == ahead and first + behind:
-            return last[first + behind - 1] + 1
+    planned, told = _places(route.waypoints), _places(way)
+    wanted, behind = [place for _, place in told], sum(last < reached for last, _ in told)
+    for first in range(len(planned)):
+        if [place for _, place in planned[first : first + len(wanted)]] == wanted and first + behind:
+            return planned[first + behind - 1][0] + 1
     return 1
+
+
+def _places(way: Sequence[Waypoint]) -> list[tuple[int, tuple[float, float, float]]]:
+    """Return the places that a way leads to, each with the number of the last of the waypoints in a row that are there."""
+    at = [(w.x, w.y, w.z) for w in way]
+    return [(i, place) for i, place in enumerate(at) if at[i + 1 : i + 2] != [place]]
 
 
 def as_told(mission: Mission, told: Sequence[Telling]) -> Mission:
