@@ -148,7 +148,8 @@ class Rerouting:
         stop = next((j for j, w in enumerate(command[done:], done) if _to_do(w)), len(command) - 1)
         standing = self._standing(i, time, here)
         self.stalled[i] = min(self.stalled[i], time) if stalled else np.inf
-        if stalled or standing >= STANDS:
+        held = stalled or standing >= STANDS
+        if held:
             if time > self.stalled[i] + PATIENCE or (standing > QUEUE and self.findings.looked):
                 return Detour((), 0, stop, done)
             if time < self.tried[i] + AGAIN:
@@ -158,8 +159,7 @@ class Rerouting:
             self.barred[i] = np.inf
             return None
         free = self.findings.clear_of(vehicle.clearance) & _aside(grid, self.findings.found(i), vehicle.clearance)
-        stalled = stalled or standing >= STANDS
-        if stalled and len(others):
+        if held and others:
             clear = free
             free = free & _aside(grid, np.array([way[0] for way in others.values()]), self.room[i])
         # Who is nearer to a thing than the clearance goes to the nearest place that is not, as plans do.
@@ -181,7 +181,7 @@ class Rerouting:
                 return Detour((*via, *onward), len(via), j, done)
             if command[j].task is not None:
                 break
-        if stalled:
+        if held:
             near = [j for j, way in others.items() if np.hypot(*(way[0] - here)) < 6 * vehicle.model.length]
             if others and standing >= STANDS * (1 + sum(j > i for j in near)):
                 return self._make_room(i, here, clear, free, list(others.values()), command, stop, done)
