@@ -52,7 +52,10 @@ def test_the_same_bytes_in_one_process_and_in_others(kind: str, tmp_path: Path, 
 
 RUNS = {  # verbs that go on from others, each with what it writes
     "triage": [
-        "triage {data}/triage_drill.geojson --seed 3 --fail ugv1@60 --log-csv {out}/log.csv --plan {out}/plan.geojson"
+        (
+            "triage {data}/triage_drill.geojson --seed 3 --fail ugv1@60 -o {out}/outcome.geojson"
+            " --log-csv {out}/log.csv --plan {out}/plan.geojson"
+        ),
     ],
     "stc": [
         "plan {data}/plant_yard.geojson --placement none -o {out}/plan.geojson",
@@ -77,7 +80,6 @@ def test_drills_replans_and_runs_are_the_same_in_others(kind: str, tmp_path: Pat
         out.mkdir()
         for line in RUNS[kind]:
             words = line.format(data=DATA, out=out).split()
-            words += ["-o", f"{out}/outcome.geojson"] if words[0] == "triage" else []
             if hashes:
                 command = [sys.executable, "-m", "quarterdeck", *words]
                 status = subprocess.run(

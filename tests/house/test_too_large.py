@@ -3,11 +3,15 @@
 import re
 import time
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from quarterdeck.cli import main
+from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.reader import read_scenario
+from quarterdeck.mission.travel import travel
 
 DATA = Path(__file__).parents[2] / "data"
 CASES = {
@@ -48,6 +52,10 @@ def test_too_fine_is_refused_with_what_works(case, tmp_path, capsys):
 def test_too_many_tasks_are_refused_with_what_works(monkeypatch, capsys, tmp_path):
     """The ways between all pairs are counted before any is looked for; as many tasks as are told are taken."""
     monkeypatch.setattr("quarterdeck.mission.travel.MOST_BYTES", 20_000)
+    scenario = read_scenario(str(DATA / "inspection_hall.geojson"))
+    assert travel(replace(scenario, tasks=scenario.tasks[:4]), quick=True).seconds.shape[1] == 4
+    with pytest.raises(InputError, match="too many to hold"):
+        travel(replace(scenario, tasks=scenario.tasks[:5]), quick=True)
     command = ["assign", str(DATA / "inspection_hall.geojson"), "--iterations", "1", "-o", str(tmp_path / "plan.geojson")]
     with pytest.raises(SystemExit) as stop:
         main(command)
