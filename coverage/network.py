@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import shapely
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from shapely import MultiPolygon
@@ -69,6 +70,9 @@ def _matrix(graph: Graph) -> csr_array:
 def _access(mesh: Triangulation, cdt: Graph, inside: np.ndarray, start: np.ndarray) -> tuple[int, np.ndarray]:
     """Return the vertex at which a robot enters, and the way there."""
     seen = visible_vertices(mesh, start)[1]
+    if not len(seen):  # by rounding it is outside: it sees the corners of the triangle beside it
+        triangles = shapely.polygons(mesh.vertices[mesh.triangles])
+        seen = mesh.triangles[int(np.argmin(shapely.distance(triangles, shapely.Point(start))))]
     away = np.linalg.norm(mesh.vertices[seen] - start, axis=1)
     good = inside[seen]
     if good.any():
