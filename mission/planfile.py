@@ -266,6 +266,9 @@ def _check_types(mission: Mission) -> None:
     known = {None, *(task.id for task in mission.tasks)}
     if mission.method == "assign" and any(w.task not in known for r in mission.routes for w in r.waypoints):
         raise ValueError("a route has a task that is not among its tasks")
+    for i, guard in enumerate(mission.guards):
+        for problem in property_problems("vehicle", {"range": guard.range}):
+            raise ValueError(f"guard-{i}: {problem}")
     known = {None, *(f"guard-{i}" for i in range(len(mission.guards)))}
     if mission.method == "guards" and any(w.task not in known for r in mission.routes for w in r.waypoints):
         raise ValueError("a route has a guard that is not among its guards")

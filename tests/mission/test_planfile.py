@@ -11,7 +11,7 @@ import pytest
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.reader import read_scenario
 from quarterdeck.geo.scenario import Precedence, Task
-from quarterdeck.mission.mission import Layer, Mission, Route, Waypoint
+from quarterdeck.mission.mission import Guard, Layer, Mission, Route, Waypoint
 from quarterdeck.mission.planfile import plan_text, read_plan
 from quarterdeck.mission.reason import Reason
 
@@ -73,6 +73,15 @@ def test_same_bytes_again(tmp_path):
     path = tmp_path / "plan.geojson"
     path.write_text(text, encoding="utf-8")
     assert plan_text(read_plan(path)) == text
+
+
+def test_a_guard_sees_as_far_as_a_vehicle_may(tmp_path):
+    """Ranges that a site could not give are refused; a guard that sees to the sun overflows what looks at it."""
+    path = tmp_path / "plan.geojson"
+    for reach in (-1e300, 1e300, 0.0):
+        path.write_text(plan_text(replace(mission(), guards=(Guard(1.0, 2.0, reach),))), encoding="utf-8")
+        with pytest.raises(InputError, match="guard-0: range must be a number above 0"):
+            read_plan(path)
 
 
 @pytest.mark.parametrize("damage", ["legs", "frame", "site"])
