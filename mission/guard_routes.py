@@ -9,6 +9,7 @@ import shapely
 
 from quarterdeck.coverage.cst import constrained_tour
 from quarterdeck.coverage.guards.space import Space
+from quarterdeck.coverage.metrics import track_length
 from quarterdeck.coverage.network import Network, network
 from quarterdeck.geo.geodesics import Geodesics, geodesics
 from quarterdeck.geo.scenario import Vehicle
@@ -87,7 +88,7 @@ def paper_tours(space: Space, guards: np.ndarray, team: Team) -> Tours:
         lines.append(np.vstack([net.access[robot][:-1], net.cdt.points[walk], back[1:]]))
         orders.append(tuple(order))
         stops.append(tuple(at))
-    times = np.array([_metres(line) for line in lines]) / team.speeds
+    times = np.array([track_length(line) for line in lines]) / team.speeds
     bound = makespan_bound(_ways(space, guards, team).lengths, team.speeds)
     return Tours(guards, net, tuple(orders), tuple(lines), tuple(stops), times, bound)
 
@@ -148,10 +149,6 @@ def _driven(ways: Geodesics, tours: Tours, orders: Sequence[Sequence[int]], team
     return Tours(tours.guards, tours.network, tuple(map(tuple, orders)), tuple(lines), tuple(stops), times, bound)
 
 
-def _metres(line: np.ndarray) -> float:
-    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
-
-
 def guard_route(vehicle: Vehicle, tours: Tours, robot: int) -> Route:
     """Return the route along a tour: from the start itself, up where it flies, past the guards, home.
 
@@ -199,7 +196,7 @@ def guard_layers(tours: Tours, team: Team) -> tuple[Layer, ...]:
         Layer(
             "tours",
             tuple(shapely.LineString(line) for line in tours.lines),
-            tuple({"vehicle": name, "length": _metres(line)} for name, line in zip(names, tours.lines, strict=True)),
+            tuple({"vehicle": name, "length": track_length(line)} for name, line in zip(names, tours.lines, strict=True)),
         ),
     )
 
