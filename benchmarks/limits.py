@@ -21,7 +21,7 @@ DEGREE = 111_320.0  # m of a degree of latitude, and of longitude at the equator
 def main() -> None:
     """Print a line of JSON for each size."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--sizes", type=int, nargs="+", default=[5_000, 100_000, 400_000, 750_000], help="hypervertices")
+    parser.add_argument("--sizes", type=int, nargs="+", default=[5_000, 100_000, 400_000, 815_000], help="hypervertices")
     parser.add_argument("--vehicles", type=int, default=3)
     parser.add_argument("--islands", type=int, default=0, help="this many small ones instead of four")
     parser.add_argument("--options", default="", help="more options of `quarterdeck plan`, such as '--method lines'")

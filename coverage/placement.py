@@ -135,7 +135,7 @@ def place(
     return Placement(grid, f, f1, f2, f3, tried)
 
 
-MAX_CELLS = 256_000_000  # path cells of a lattice's box, free or not: the search and the grid hold bytes for each
+MAX_CELLS = 56_000_000  # path cells of a lattice's box, free or not: planning holds up to 28 bytes for each
 
 
 def _most_cells(edges: np.ndarray, angle: float | None) -> int:

@@ -31,7 +31,7 @@ from quarterdeck.mission.routes import survey_lines, survey_routes
 from quarterdeck.mission.survey_shares import ranked, urgent_first
 from quarterdeck.mission.timing import seconds_out
 
-MAX_HYPERVERTICES = 800_000  # of which 390,000 take 1.0 GB in all (benchmarks/limits.py): so that 2 GB are enough
+MAX_HYPERVERTICES = 800_000  # which take 1.75 GB in all (benchmarks/limits.py --sizes 815000): 2 GB are enough
 ROUNDS = 2  # of dividing again, once ways and turns are known
 
 
