@@ -114,10 +114,10 @@ def _fresh(
 ) -> tuple[list[np.ndarray], list[str]]:
     """Return the (n, 2) survey lines of areas that are new, and of what obstacles that are gone have kept uncovered.
 
-    What those `done` have covered meanwhile, or before, is not covered again.
+    What those `done` have covered is not covered again, but where what is left of it has no room for tracks by itself.
     """
     spacing, site = float(mission.spacing or 0.0), scenario.site
-    areas = list(changes.areas)
+    areas: list[tuple[Area, ...]] = [(area,) for area in changes.areas]
     margin = max(v.clearance for v in scenario.vehicles) + spacing / 2
     sliver = VISITED * spacing / 2
     for obstacle in mission.site.obstacles:
@@ -126,17 +126,22 @@ def _fresh(
             near = [np.array(line.coords) for line in done if shapely.dwithin(line, around, spacing / 2)]
             bare = around.difference(_swath(near, spacing))
             freed = as_multipolygon(bare.buffer(-sliver).buffer(sliver).intersection(bare))
-            areas += [Area(obstacle.id, freed)] if freed.area > 0 else []
+            areas += [(Area(obstacle.id, freed), Area(obstacle.id, as_multipolygon(around)))] if freed.area > 0 else []
     lines, notes = [], []
     vehicles = tuple(replace(v, share=None) for v in scenario.vehicles)
-    for area in areas:
-        new = replace(scenario, site=Site((area,), site.operating, site.obstacles), vehicles=vehicles, spacing=spacing)
-        try:
-            added = _planned(mission, new, seed)
-        except InputError as error:
-            notes.append(f"{area.id}: {error}")
-            continue
-        lines += [run for r in added.routes for run in unbroken(r.xyz[:, :2], r.survey)]
+    for choices in areas:
+        why = ""
+        for area in choices:
+            new = replace(scenario, site=Site((area,), site.operating, site.obstacles), vehicles=vehicles, spacing=spacing)
+            try:
+                added = _planned(mission, new, seed)
+            except InputError as error:
+                why = f"{area.id}: {error}"
+                continue
+            lines += [run for r in added.routes for run in unbroken(r.xyz[:, :2], r.survey)]
+            break
+        else:
+            notes.append(why)
     return lines, notes
 
 
