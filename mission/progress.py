@@ -22,7 +22,7 @@ class Progress:
     the seconds at which it would be there by the plan; None: as planned, at `time`. `headings` are radians by vehicle,
     where they are known, `servers` who did a task, where it may be another vehicle than planned. `begun` are the tasks that
     are under way: by whom, and for how many seconds; None: as planned, where who is to be there is. `stand` is what the
-    director of a triage mission has in mind; there `tracks` are the UGVs' whole ways.
+    director of a triage mission has in mind; there `tracks` are the UGVs' whole ways. `lost` are vehicles known to be lost.
     """
 
     time: float
@@ -35,6 +35,7 @@ class Progress:
     servers: Mapping[str, str] = field(default_factory=dict)
     begun: Mapping[str, tuple[str, float]] | None = None
     stand: Stand | None = None
+    lost: frozenset[str] = frozenset()
 
 
 def planned_progress(mission: Mission, time: float, *, stopped: Mapping[str, float] | None = None) -> Progress:

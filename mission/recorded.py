@@ -153,6 +153,8 @@ def read_state(mission: Mission, path: str, *, lost: frozenset[str] = frozenset(
             tracks=tuple(mission.frame.to_metres(np.array(line, float)) for line in state["tracks"]),
             served=frozenset(map(str, state["served"])),
             along={v: float(s["along"]) for v, s in state["vehicles"].items()},
+            # Of a triage team the stand tells: a medic who loses a device works on.
+            lost=frozenset(str(v["id"]) for v in document["vehicles"] if v["lost"] and "triage" not in state),
         )
         of, triage = state["input_hash"], state.get("triage")
     except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError):

@@ -320,7 +320,9 @@ def asked_for(mission: Mission, wishes: Sequence[Changes]) -> Mission:
             {*wish.lost, *wish.back, *wish.speeds, *wish.batteries, *wish.endurances, *(v.id for v in wish.joined)}
         )
         if about:
-            raise InputError(f"vehicle {about[0]!r}: in a run vehicles change by faults (--fail), not by changes")
+            raise InputError(
+                f"vehicle {about[0]!r}: in a run vehicles change by faults (--fail ID@S, thruster:ID@S), not by changes"
+            )
         check_changes(mission, wish)
         mission = replace(mission, site=changed_site(mission.site, wish), tasks=changed_tasks(mission.tasks, wish))
     return mission

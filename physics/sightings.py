@@ -36,7 +36,7 @@ class Lookout:
         self.eyes = np.array([EYES["medic" if i in team.medics else "ugv"] for i in self.ids])
         self.seen = np.zeros((len(self.ids), len(self.targets)), bool)
         self.reach = reach_of(mission.parameters["method"], settings)
-        order = [*team.ugvs, *team.uavs, *team.medics]
+        order = [i for i in (*team.ugvs, *team.uavs, *team.medics) if i in self.ids]  # who is given up is not there
         pairs = [(self.ids.index(a), self.ids.index(b)) for a, b in combinations(order, 2) if b not in team.ugvs]
         self.pairs = np.array(pairs, int).reshape(-1, 2)
         self.near = np.zeros(len(pairs), bool)

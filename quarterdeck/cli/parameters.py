@@ -20,6 +20,10 @@ class Real(click.FloatRange):
             self.fail(f"{value!r} is not a finite number up to 1e12", param, ctx)
         return number
 
+    def _describe_range(self) -> str:
+        """Return what the help says of limits; of none nothing."""
+        return "" if self.min is None and self.max is None else super()._describe_range()
+
 
 class Choice(click.Choice[str]):
     """One of some words; what is none is answered with the nearest."""

@@ -67,7 +67,7 @@ def command(
     """
     from quarterdeck.api import within
     from quarterdeck.geo.deadline import limited
-    from quarterdeck.mission.changes import check_changes, read_changes
+    from quarterdeck.mission.changes import Changes, check_changes, read_changes
     from quarterdeck.mission.planfile import plan_text, read_plan
     from quarterdeck.mission.replan import replan
 
@@ -79,6 +79,9 @@ def command(
     check_changes(mission, changes)
     stopped = {v: changes.since.get(v, math.inf) for v in changes.lost}
     so_far = _progress(mission, time, tracks, start, state, stopped)
+    for vehicle in sorted(so_far.lost & {v.id for v in mission.vehicles} - changes.lost - changes.back.keys()):
+        print_reason(console(), "note", f"{vehicle} was lost, by the report: others do what is left of its part")
+        changes |= Changes(lost=frozenset({vehicle}))
     with limited(interruptible=tell_stopping) as limit:
         after = within(time_limit, lambda: replan(mission, so_far, changes, seed=seed))
     emit(plan_text(after), output, force=force)

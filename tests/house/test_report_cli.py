@@ -118,6 +118,13 @@ def test_replan_from_logs_and_from_the_report(flown, tmp_path, capsys):
             assert np.allclose(mine.xyz[2:], theirs.xyz[len(theirs.xyz) - len(mine.xyz) + 2 :], atol=1e-6)
             assert mine.duration == pytest.approx(theirs.duration, abs=1.0)
     assert "no energy in its log" in capsys.readouterr().err
+    document = json.loads(report.read_text(encoding="utf-8"))
+    document["vehicles"][0]["lost"] = True
+    report.write_text(json.dumps(document), encoding="utf-8")
+    run("replan", plan, "--state", report, "-o", tmp_path / "without.geojson")
+    gone = document["vehicles"][0]["id"]
+    assert f"{gone} was lost, by the report" in capsys.readouterr().err
+    assert gone in {v.id for v in read_plan(str(tmp_path / "without.geojson")).lost}
 
 
 @pytest.mark.parametrize(

@@ -128,12 +128,16 @@ def test_a_mission_goes_on_from_the_report_of_a_run(tmp_path) -> None:  # type: 
     jsonschema.Draft202012Validator(report_schema()).validate(json.loads(path.read_text(encoding="utf-8")))
     progress = read_state(mission, str(path))
     for changes in (Changes(), Changes(lost=frozenset({"uav1"}))):
-        outcome = run_plan(replan(mission, progress, changes))
+        later = replan(mission, progress, changes)
+        outcome = run_plan(later)
         assert outcome.reasons == ()
         for before, after in zip(run.triage.driven.fates, outcome.fates, strict=True):
             assert before.found is None or after.found == pytest.approx(before.found, abs=1e-3)
             assert before.treated is None or after.treated == pytest.approx(before.treated, abs=1e-3)
     assert any(f.found is not None for f in run.triage.driven.fates)
+    again = simulate(later, duration=5.0)  # without the UAV
+    assert again.trace.vehicles == tuple(v.id for v in later.vehicles)
+    assert "uav1" not in again.trace.vehicles
 
 
 @pytest.mark.parametrize("faults", [(), ("medic1@60",)])
