@@ -46,10 +46,8 @@ def as_told(mission: Mission, told: Sequence[Telling]) -> Mission:
     """Return the mission with the routes that its vehicles were told in a run, one after the other, times from its start.
 
     Who was told nothing has the route that it had: it may not have heard that others are to do the rest of it. A task is on
-    the route to which it was given last.
+    the route to which it was given last, and on none if it is not asked for any more: `mission` has those that are.
     """
-    if not told:
-        return mission
     guards = list(mission.guards)
     routes = {r.vehicle: r for r in mission.routes}
     begins = dict.fromkeys(routes, 0)  # the waypoint at which the route that was told last begins
@@ -66,6 +64,8 @@ def as_told(mission: Mission, told: Sequence[Telling]) -> Mission:
         ahead = [replace(w, time=w.time + time) for w in new[1:]]
         routes[name] = Route(name, (*before, here, *ahead), telling.energy + telling.route.energy)
         begins[name] = len(before)
+    asked = {*(t.id for t in mission.tasks), *(f"guard-{i}" for i in range(len(guards)))}
+    given = {task: name for task, name in given.items() if task in asked}
     routes = {name: replace(r, waypoints=tuple(_of(name, w, given) for w in r.waypoints)) for name, r in routes.items()}
     passes = {w.task: (v, i) for v, r in routes.items() for i, w in enumerate(w for w in r.waypoints if w.task)}
     whose = [passes.get(f"guard-{i}", (None, None)) for i in range(len(guards))]
@@ -76,7 +76,7 @@ def as_told(mission: Mission, told: Sequence[Telling]) -> Mission:
         parameters={**mission.parameters, "told_at": sorted({t.time for t in told})},
         figures={
             **mission.figures,
-            "makespan": max(r.duration for r in routes.values()),
+            "makespan": max((r.duration for r in routes.values()), default=0.0),
             "energy": sum(r.energy for r in routes.values()),
         },
     )
@@ -91,8 +91,8 @@ def _planned(last: Waypoint, under_way: Waypoint, place: tuple[float, float, flo
 
 
 def _of(vehicle: str, waypoint: Waypoint, given: Mapping[str, str]) -> Waypoint:
-    """Return a waypoint without its task where that was given to another vehicle since."""
-    here = waypoint.task is None or given[waypoint.task] == vehicle
+    """Return a waypoint without its task where that was given to another vehicle since, or to nobody."""
+    here = waypoint.task is None or given.get(waypoint.task) == vehicle
     return waypoint if here else replace(waypoint, task=None)
 
 

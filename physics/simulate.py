@@ -42,9 +42,9 @@ class Run:
     trace: Trace
     report: Report
     triage: Compared | None = None  # of a triage mission: what became of its casualties
-    site: Site | None = None  # what was there
+    site: Site | None = None  # what was there in the end, and what was to be covered by then
     map: Occupancy | None = None  # what robots that drew a map made of it
-    told: Mission | None = None  # the plan as its vehicles were told it, by a director that replans
+    told: Mission | None = None  # the plan as its vehicles were told it, of the site and the tasks asked for in the end
 
 
 def simulate(
@@ -159,20 +159,22 @@ def simulate(
     }
     dead = {v for v, gone in zip(ids, (run.lost | run.aground).tolist(), strict=True) if gone}
     reliefs = [relief for v, relief in relieved(run.memory).items() if v in dead]
-    told = as_told(plan, (*tellings(run.memory), *reliefs))
+    heeded = [wish for when, wish in changes if when <= run.time]
+    orders = (*tellings(run.memory), *reliefs)
+    told = as_told(asked_for(plan, heeded), orders) if heeded or orders else plan
     served, servers = run.served, run.servers
     if told is not plan and plan.method == "guards":  # each plan numbers its guards anew
         found = served_tasks(told, trace.tracks())
         served, servers = {task: when for task, (when, _) in found.items()}, {task: who for task, (_, who) in found.items()}
-    heeded = [wish for when, wish in changes if when <= run.time]
-    asked, during = asked_for(plan, heeded), {o.id: (0.0, when) for when, old, _ in turns for o in old}
+    during = {o.id: (0.0, when) for when, old, _ in turns for o in old}
     during |= {o.id: (when, during.get(o.id, (0.0, np.inf))[1]) for when, _, new in turns for o in new}
     ever = (*mission.site.obstacles, *(o for _, _, new in turns for o in new))
     standing = tuple(
         o for o in ever if during.get(o.id, (0.0, np.inf))[1] > run.time and during.get(o.id, (0.0,))[0] <= run.time
     )
+    left = replace(told.site, obstacles=standing)
     report = measure(
-        mission if compared else replace(told, site=replace(asked.site, obstacles=standing), tasks=asked.tasks),
+        mission if compared else replace(told, site=left),
         trace,
         finished=run.finished.tolist(),
         aground=run.aground.tolist(),
@@ -195,7 +197,7 @@ def simulate(
     if sensing.mapping and run.router is not None:
         made = replace(run.router.findings.shared.occupancy(), place=(mission.frame.lon, mission.frame.lat))
         report = replace(report, figures={**report.figures, **agreement(made, mission.site)})
-    return Run(trace, report, compared, mission.site, made, told)
+    return Run(trace, report, compared, left, made, told)
 
 
 def _turns(site: Site, changes: Sequence[tuple[float, Changes]]) -> list[tuple[float, list[Obstacle], list[Obstacle]]]:

@@ -184,8 +184,9 @@ def command(
     if picture:
         from quarterdeck.exporters.picture import picture as draw
 
-        there = mission if run.site is None else replace(mission, site=run.site)
-        known = {o.id for o in mission.site.obstacles}
+        plan = run.told or mission
+        there = replace(plan, site=run.site or plan.site)
+        known = {o.id for o in plan.site.obstacles}
         strange = () if options["world"] else tuple(o for o in there.site.obstacles if o.id not in known)
         emit(draw(there, run.trace, run.report, strange=strange), picture, force=force)
     if run.triage is not None:

@@ -11,12 +11,12 @@ from shapely import Point, Polygon, box
 from quarterdeck.cli import main
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.reader import read_scenario
-from quarterdeck.geo.scenario import Obstacle, Task
+from quarterdeck.geo.scenario import Area, Obstacle, Task, as_multipolygon
 from quarterdeck.mission.assign import assign
 from quarterdeck.mission.changes import Changes
 from quarterdeck.mission.cover import cover
 from quarterdeck.mission.guards import plan_guards
-from quarterdeck.mission.planfile import plan_text
+from quarterdeck.mission.planfile import plan_text, read_plan
 from quarterdeck.mission.recovery import recovering
 from quarterdeck.physics.simulate import simulate
 
@@ -84,6 +84,25 @@ def test_all_withdrawn_sends_guards_home():
     came = run(mission, (40.0, Changes(withdrawn=frozenset(a.id for a in mission.site.areas))))
     assert came.report.passed, came.report.reasons
     assert came.report.figures["time"] < max(r.duration for r in mission.routes)
+
+
+def test_the_plan_as_told_is_of_what_is_asked_for(tmp_path):
+    """It has the site and the tasks that the run is judged by, none that was withdrawn, done or not, and can be read."""
+    mission = survey()
+    x, y = mission.site.operating.bounds[2:]
+    area = Area("late", as_multipolygon(box(x, y - 60.0, x + 20.0, y - 30.0)), 2)
+    truck = Obstacle("truck", box(x - 50.0, y - 60.0, x - 48.0, y - 40.0), frozenset({"ground"}))
+    changes = [(20.0, Changes(areas=(area,), obstacles=(truck,), gone=frozenset({"tank"})))]
+    came = simulate(mission, director=recovering(mission, changes=changes), changes=changes, sample=1.0, duration=25.0)
+    for site in (came.told.site, came.site):
+        assert [(a.id, a.priority) for a in site.areas] == [*((a.id, a.priority) for a in mission.site.areas), ("late", 2)]
+        assert {o.id for o in site.obstacles} == {*(o.id for o in mission.site.obstacles), "truck"} - {"tank"}
+    tasks = assign(read_scenario(DATA / "inspection_hall.geojson"), iterations=10)
+    done = min((w for r in tasks.routes for w in r.waypoints if w.task), key=lambda w: w.time + w.hold)
+    told = run(tasks, (done.time + done.hold + 10.0, Changes(withdrawn=frozenset({done.task})))).told
+    assert {w.task for r in told.routes for w in r.waypoints if w.task} == {t.id for t in told.tasks}
+    (tmp_path / "told.geojson").write_text(plan_text(told))
+    assert done.task not in {t.id for t in read_plan(tmp_path / "told.geojson").tasks}
 
 
 def test_vehicles_change_by_faults_only():
