@@ -23,9 +23,10 @@ class Frame:
         return np.column_stack(_transformer(self.lon, self.lat).transform(lonlat[:, 0], lonlat[:, 1]))
 
     def to_degrees(self, xy: np.ndarray) -> np.ndarray:
-        """Return (n, 2) longitudes in [-180, 180) and latitudes in degrees of (n, 2) metres."""
+        """Return (n, 2) longitudes in [-180, 180) and latitudes in degrees of (n, 2) metres; NaN off the Earth."""
         xy = np.asarray(xy, dtype=float).reshape(-1, 2)
         lon, lat = _transformer(self.lon, self.lat).transform(xy[:, 0], xy[:, 1], direction="INVERSE")
+        lon, lat = (np.where(np.isfinite(c), c, np.nan) for c in (lon, lat))
         return np.column_stack([(lon + 180.0) % 360.0 - 180.0, lat])
 
 

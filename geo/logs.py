@@ -115,7 +115,7 @@ def _trace(path: str, data: bytes) -> list[Log]:
         raise InputError(f"{path}: is a damaged trace: its columns are of different lengths")
     logs = []
     for i, name in enumerate(names):
-        own = {n: found[n][:, i] for n in columns}
+        own = {n: finite(found[n][:, i]) for n in columns}
         lon, lat = frame.to_degrees(np.column_stack([own["x"], own["y"]])).T
         known = (own["z"], own["heading"], own["speed"], own["energy"])
         logs.append(Log(name, path, "mission", time, lon, lat, *known))

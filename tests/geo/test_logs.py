@@ -127,6 +127,17 @@ def test_figures_that_are_none(write_log, tmp_path, value):
     assert not np.isinf(log.energy).any()
 
 
+def test_a_trace_off_the_earth(tmp_path):
+    """Places and energies that can be none are not known; what is known stays."""
+    columns = {n: np.zeros((3, 1)) for n in ("x", "y", "z", "heading", "speed", "energy")}
+    columns["x"][1], columns["energy"][2] = 1e300, np.inf
+    path = tmp_path / "trace.npz"
+    np.savez(path, **columns, origin=np.array([10.0, 54.0]), time=np.arange(3.0), vehicles=np.array(["v1"]))
+    (log,) = read_logs(str(path))
+    assert np.isnan(log.lon).tolist() == [False, True, False]
+    assert np.isnan(log.energy).tolist() == [False, False, True]
+
+
 @pytest.mark.parametrize("damage", ["kind", "shape", "origin", "text", "flood"])
 def test_damaged_traces(tmp_path, damage):
     """Numbers of other kinds, other shapes, a place off the Earth, a header that is none: one line."""
