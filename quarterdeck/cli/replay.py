@@ -55,7 +55,8 @@ def command(file: str, plan: str | None, site: str | None, within: float, as_jso
     read = _read(file)
     if isinstance(read, Document):
         if site is None or plan is not None:
-            raise InputError(f"{file}: is no report; to run it again give its site by --site, and no --plan")
+            how = "to run it again give its site by --site, and no --plan"
+            raise InputError(f"{file}: is {kind_of(read.data)}; {how}")
         found += (drill_again if kind_of(read.data) == FATES else plan_again)(read, site, within)
     else:
         options = _with_files(read, file, plan)

@@ -93,7 +93,7 @@ def test_a_file_of_another_verb_is_told_what_it_is(tmp_path, capsys):
     capsys.readouterr()
     assert "is a PLAN; `check`, `simulate`" in refused(capsys, "plan", plan)
     assert "is a PLAN; `check`, `simulate`" in refused(capsys, "campaign", plan)
-    assert "is a PLAN, not a report" in refused(capsys, "replay", plan)
+    assert "to run it again give its site by --site" in refused(capsys, "replay", plan)
     assert "not a PLAN, but a site; `check`, `plan`" in refused(capsys, "simulate", DATA / "dalian_harbour.geojson")
     assert "is a site; `check`, `plan`" in refused(capsys, "replay", DATA / "dalian_harbour.geojson")
     assert "is a study; `campaign` takes it" in refused(capsys, "check", study)
