@@ -16,7 +16,7 @@ from quarterdeck.mission.director import State
 from quarterdeck.mission.mission import Layer, Mission, Route, Waypoint
 from quarterdeck.mission.progress import Progress
 from quarterdeck.mission.reason import Reason
-from quarterdeck.mission.timing import shortfalls, timed_route
+from quarterdeck.mission.timing import commanded_route, shortfalls
 from quarterdeck.mission.triage import medic, uav, ugv
 from quarterdeck.mission.triage.desk import Desk
 from quarterdeck.mission.triage.outcome import run_members
@@ -147,13 +147,7 @@ def _route(mission: Mission, name: str, progress: Progress, stand: Stand) -> Rou
     """Return what is left of a member's command as a route."""
     vehicle, left = mission.vehicle(name), stand.left.get(name, ())
     here = (*vehicle.start, progress.positions[name][2] if name in progress.positions else 0.0)
-    return timed_route(
-        vehicle,
-        np.array([here, *((w.x, w.y, w.z) for w in left)]),
-        ["start", *(w.leg for w in left)],
-        pace=[1.0, *((w.speed or vehicle.speed) / vehicle.speed for w in left)],
-        holds=[0.0, *(w.hold for w in left)],
-    )
+    return commanded_route(vehicle, here, [replace(w, task=None) for w in left])
 
 
 def _changed(

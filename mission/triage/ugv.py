@@ -1,6 +1,6 @@
 """The UGV: explore, continued explore, deliver, wait, return (Fig. 3); seek, when the UAV does not come."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from math import hypot, inf
@@ -182,23 +182,16 @@ def way_home(desk: Desk, name: str, corners: Sequence[XY] | None = None) -> list
 
 def restart(desk: Desk, name: str) -> None:
     """Set out again for what it was doing, from where it is."""
-    me: Ugv = desk.agents[name]
-    if me.state == "explore":
-        resume(desk, name)
-    elif me.state == "return":
-        _back(desk, name)
-    elif me.state == "deliver":
-        _report(desk, name)
-    elif me.state == "wait":
-        _wait(desk, name)
-    elif me.state == "seek":
-        _look_for_medic(desk, name)
-    elif me.state == "continued explore":
-        arrived(desk, name)
-    elif me.state == "home":
-        _drive(desk, name, way_home(desk, name, []))
-    else:
-        stand_by(desk, name)
+    onward: dict[str, Callable[[Desk, str], None]] = {
+        "explore": resume,
+        "return": _back,
+        "deliver": _report,
+        "wait": _wait,
+        "seek": _look_for_medic,
+        "continued explore": arrived,
+        "home": lambda desk, name: _drive(desk, name, way_home(desk, name, [])),
+    }
+    onward.get(desk.agents[name].state, stand_by)(desk, name)
 
 
 def stand_by(desk: Desk, name: str) -> None:

@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
 from multiprocessing import get_context
 from typing import Any
 
@@ -114,7 +113,7 @@ def over_cluster(text: str, todo: list[Case], limits: dict[str, float], address:
         # A few more than there are hands for, so that none waits; workers that join later are given work as it goes.
         hands = 2 * sum(client.nthreads().values()) + 2
         flying = as_completed([submit() for _ in range(min(len(waiting), hands))], loop=client.loop, timeout=time_left())
-        with suppress(TimeoutError):
+        try:
             for future in flying:
                 try:
                     row = future.result()
@@ -129,6 +128,9 @@ def over_cluster(text: str, todo: list[Case], limits: dict[str, float], address:
                     return
                 if waiting:
                     flying.add(submit())
+        except TimeoutError:  # of the wait; a run's own ends the campaign in the open
+            if not time_is_up(RUNS):
+                raise
 
 
 def _version() -> str:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from quarterdeck.campaign.execute import run_case
+from quarterdeck.campaign.execute import over_cluster, run_case
 from quarterdeck.campaign.journal import Journal
 from quarterdeck.campaign.study import cases, read_study
 from quarterdeck.cli import main
@@ -238,6 +238,19 @@ def test_a_cluster_survives_the_loss_of_a_worker(study: Writer, whole: Path, tmp
     assert left > 0
     assert sorted(row["number"] for row in rows(folder)) == list(range(24))
     assert (folder / "runs.csv").read_bytes() == (whole / "runs.csv").read_bytes()
+
+
+@pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning", "ignore:Port .* is already in use")
+def test_a_run_that_times_out_on_a_cluster_is_heard_of(study: Writer, cluster, monkeypatch) -> None:
+    """A run's own TimeoutError is no time limit: it does not end a campaign as if all were done."""
+
+    def late(*_: object) -> None:
+        raise TimeoutError("on purpose")
+
+    monkeypatch.setattr("quarterdeck.campaign.execute.run_case", late)
+    asked = read_study(study(STUDY))
+    with pytest.raises(TimeoutError, match="on purpose"):
+        list(over_cluster(asked.text, list(cases(asked))[:2], {}, cluster[0]))
 
 
 def test_nobody_at_the_address_is_one_line(study: Writer, tmp_path: Path, capfd) -> None:
