@@ -22,12 +22,10 @@ LEAST = 0.5  # m: shoaler water has the swath of this depth, for no line could b
 Soundings = tuple[tuple[float, float, float], ...]  # x, y and depth, metres
 
 
-def read_soundings(features: Sequence[dict[str, Any]], frame: Frame, problems: list[str]) -> Soundings:
-    """Return the soundings among a site's features that have been looked at; those without a depth are problems."""
-    problems += [
-        f"{f['place']}: a sounding needs its depth in metres" for f in features if f["properties"].get("depth") is None
-    ]
-    if problems or not features:
+def read_soundings(features: Sequence[dict[str, Any]], frame: Frame) -> Soundings:
+    """Return the soundings among a site's features that have been looked at; one whose depth is wrong is left out."""
+    features = [f for f in features if f["properties"].get("depth") is not None]
+    if not features:
         return ()
     xy = frame.to_metres(np.array([f["geometry"]["coordinates"][:2] for f in features], dtype=float)).tolist()
     return tuple((x, y, float(f["properties"]["depth"])) for (x, y), f in zip(xy, features, strict=True))

@@ -102,24 +102,23 @@ def _read(
     required = ("area", "task", "casualty") if frame is None else tuple(GEOMETRIES)
     if not any(f["role"] in required for f in features) and not problems:
         problems.append('no feature has the role "area" or "task"; give the polygon to be covered "role": "area"')
-    if problems:
-        return None, problems
     frame = frame or _frame(features, problems)
-    if problems:
+    if frame is None:
         return None, problems
     shapes = _shapes(features, frame, problems)
-    if problems:
-        return None, problems
     spacings = sorted({f["properties"]["spacing"] for f in features if f["properties"].get("spacing") is not None})
     if len(spacings) > 1:
         problems.append(f"areas give different spacings ({', '.join(f'{s:g}' for s in spacings)}); give one")
-    soundings = read_soundings([f for f in features if f["role"] == "sounding"], frame, problems)
-    least = least_depth(soundings, [shapes[f["place"]] for f in features if f["role"] == "area"])
+    soundings = read_soundings([f for f in features if f["role"] == "sounding"], frame)
+    least = least_depth(soundings, [shapes[f["place"]] for f in features if f["role"] == "area" and f["place"] in shapes])
     vehicles = [_vehicle(f, frame, problems, least) for f in features if f["role"] == "vehicle"]
+    problems += [*_repeated(features, "area"), *_repeated(features, "vehicle")]
+    tasks = tuple(_task(f, frame) for f in features if f["role"] == "task")
+    if len(features) == len(counted):  # else what a task comes after may be among those left out
+        problems += _task_problems(tasks, others)
     if problems:
         return None, problems
     fleet = tuple(v for v in vehicles if v is not None)
-    tasks = tuple(_task(f, frame) for f in features if f["role"] == "task")
     points = {role: tuple((f["id"], _xy(f, frame)) for f in features if f["role"] == role) for role in POINTS}
     site = _site(features, shapes, [*fleet, *tasks], [xy for r in points for _, xy in points[r]])
     scenario = Scenario(
@@ -139,25 +138,22 @@ def _read(
         input_hash=hashlib.sha256(document.data).hexdigest(),
         soundings=soundings,
     )
-    problems += _area_problems(features)
     problems += _vehicle_problems(features, scenario)
-    problems += _task_problems(scenario, others)
     return (None if problems else scenario), problems
 
 
 def _feature(index: int, raw: Any, problems: list[str], *, site: bool) -> dict[str, Any] | None:
-    """Check one feature's form; return it with `place`, `role`, `id`, or None where it is wrong or not ours."""
-    place = f"features[{index}]"
+    """Check one feature's form; return it with `place`, `role`, `id` and the properties that are right (`whole`: all are),
+    or None where it has no role or no place.
+    """
     if not isinstance(raw, dict) or raw.get("type") != "Feature":
-        problems.append(f'{place}: not a Feature; every item of "features" must be one')
+        problems.append(f'features[{index}]: not a Feature; every item of "features" must be one')
         return None
     properties = raw.get("properties") or {}
     if not isinstance(properties, dict):
-        problems.append(f"{place}: properties must be an object")
+        problems.append(f"features[{index}]: properties must be an object")
         return None
-    given = properties.get("id") if properties.get("id") is not None else raw.get("id")
-    if given is not None:
-        place = f"{place} ({given!r})"
+    place = place_of(index, raw)
     if site and properties.get("change") is not None:
         problems.append(f'{place}: "change" belongs into a file for `quarterdeck replan --changes`; a site has none')
         return None
@@ -175,32 +171,45 @@ def _feature(index: int, raw: Any, problems: list[str], *, site: bool) -> dict[s
     if not isinstance(kind, str) or kind not in GEOMETRIES[role]:
         problems.append(f"{place}: a feature of role {role} must be a {' or '.join(GEOMETRIES[role])}, not {kind}")
         return None
-    found = [f"{place}: {p}" for p in property_problems(role, properties)]
-    if kind == "Point" and (problem := position_problem(geometry.get("coordinates"))):
-        found.append(f"{place}: {problem}")
+    wrong = {name: p for name, value in properties.items() for p in property_problems(role, {name: value})}
+    problems += [f"{place}: {p}" for p in wrong.values()]
+    found = []
+    if role == "sounding" and properties.get("depth") is None:
+        found.append("a sounding needs its depth in metres")
     if kind in LINES and properties.get("width") is None:
-        found.append(
-            f'{place}: a {kind} needs the property "width", metres across the corridor along it; or draw a polygon'
-        )
+        found.append(f'a {kind} needs the property "width", metres across the corridor along it; or draw a polygon')
     if kind not in LINES and role == "area" and properties.get("width") is not None:
-        found.append(f"{place}: width belongs to a LineString; a {kind} has its own, remove it")
-    if kind != "Point":
-        wrong = next((p for p in map(position_problem, positions(geometry)) if p), None)
-        found += [f"{place}: {wrong}"] if wrong else []
-    problems += found
-    identity = str(given) if given is not None else f"{role}-{index}"
-    return None if found else {"place": place, "role": role, "id": identity, "geometry": geometry, "properties": properties}
+        found.append(f"width belongs to a LineString; a {kind} has its own, remove it")
+    places = [geometry.get("coordinates")] if kind == "Point" else positions(geometry)
+    found += [p for p in map(position_problem, places) if p][:1]
+    problems += [f"{place}: {p}" for p in found]
+    if found:
+        return None
+    right = {name: value for name, value in properties.items() if name not in wrong}
+    identity = f"{role}-{index}" if (given := _given_id(raw)) is None else str(given)
+    return {"place": place, "role": role, "id": identity, "geometry": geometry, "properties": right, "whole": not wrong}
 
 
-def _frame(features: Sequence[dict[str, Any]], problems: list[str]) -> Frame:
-    """Centre the frame on what is to be covered or visited, whatever the order of features, over any meridian."""
+def place_of(index: int, raw: dict[str, Any]) -> str:
+    """Return how messages name the feature at an index."""
+    return f"features[{index}]" + ("" if (given := _given_id(raw)) is None else f" ({given!r})")
+
+
+def _given_id(raw: dict[str, Any]) -> Any:
+    return raw.get("id") if (own := (raw.get("properties") or {}).get("id")) is None else own
+
+
+def _frame(features: Sequence[dict[str, Any]], problems: list[str]) -> Frame | None:
+    """Centre the frame on what is to be covered or visited, whatever the order of features, over any meridian; None where
+    there is no such thing.
+    """
     work = [f for f in features if f["role"] == "area"] or [
         f for f in features if f["role"] in ("task", "casualty", "operating")
     ]
     lonlat = np.array([p[:2] for f in work for p in positions(f["geometry"])], dtype=float).reshape(-1, 2)
     if not len(lonlat):
-        problems.append(f"{work[0]['place']}: the geometry has no positions")
-        return Frame(0.0, 0.0)
+        problems += [f"{f['place']}: the geometry has no positions" for f in work]
+        return None
     # Longitudes are unwrapped at the largest gap, so that a site over the antimeridian is one piece.
     lon = np.sort(np.unique(lonlat[:, 0] % 360.0))
     gaps = np.diff(np.append(lon, lon[0] + 360.0))
@@ -244,36 +253,33 @@ def _xy(feature: dict[str, Any], frame: Frame) -> tuple[float, float]:
 
 
 def _vehicle(feature: dict[str, Any], frame: Frame, problems: list[str], depth: float | None) -> Vehicle | None:
-    """Return a vehicle, its model's figures where it gives none of its own."""
+    """Return a vehicle, its model's figures where it gives none of its own; None where something is wrong with it."""
     given = {k: v for k, v in feature["properties"].items() if v is not None}
+    found, end, sensor, model = list[str](), None, None, load_model(DEFAULT_MODEL[given.get("domain", "surface")])
     try:
-        model = load_model(given.get("model") or DEFAULT_MODEL[given.get("domain", "surface")])
+        model = load_model(given.get("model", model.name))
+        if given.get("domain", model.domain) != model.domain:
+            found.append(f"domain {given['domain']} contradicts model {model.name} ({model.domain})")
+        elif given.get("speed", 0) > model.max_speed:
+            found.append(f"speed {given['speed']:g} m/s exceeds {model.name}'s {model.max_speed:g} m/s")
     except InputError as error:
-        problems.append(f"{feature['place']}: {error}")
-        return None
-    if given.get("domain", model.domain) != model.domain:
-        problems.append(f"{feature['place']}: domain {given['domain']} contradicts model {model.name} ({model.domain})")
-        return None
-    if given.get("speed", 0) > model.max_speed:
-        problems.append(f"{feature['place']}: speed {given['speed']:g} m/s exceeds {model.name}'s {model.max_speed:g} m/s")
-        return None
-    end = None
-    if "end" in given:
-        if problem := position_problem(given["end"]):
-            problems.append(f"{feature['place']}: end: {problem}")
-            return None
+        found.append(str(error))
+    if problem := position_problem(given["end"]) if "end" in given else None:
+        found.append(f"end: {problem}")
+    elif "end" in given:
         x, y = frame.to_metres(np.array(given["end"][:2], dtype=float))[0]
-        if not np.hypot(x, y) <= MAX_RADIUS:
-            problems.append(f"{feature['place']}: end is more than {MAX_RADIUS / 1000:.0f} km from the site's centre")
-            return None
         end = (float(x), float(y))
-    sensor, altitude = None, float(given.get("altitude", model.altitude))
-    if "sensor" in given:
+        if not np.hypot(x, y) <= MAX_RADIUS:
+            found.append(f"end is more than {MAX_RADIUS / 1000:.0f} km from the site's centre")
+    altitude = float(given.get("altitude", model.altitude))
+    if "sensor" in given and feature["whole"] and not found:  # what it sees depends on the rest
         try:
             sensor, altitude = fit(given["sensor"], given.get("altitude"), model.altitude, depth)
         except InputError as error:
-            problems.append(f"{feature['place']}: sensor: {error}")
-            return None
+            found.append(f"sensor: {error}")
+    if found:
+        problems += [f"{feature['place']}: {problem}" for problem in found]
+        return None
     return Vehicle(
         id=feature["id"],
         model=model,
@@ -349,10 +355,11 @@ def _obstacle_parts(feature: dict[str, Any], shape: MultiPolygon) -> list[tuple[
     return [(i, part, blocks, height) for i, part in zip(ids, shape.geoms, strict=True)]
 
 
-def _area_problems(features: Sequence[dict[str, Any]]) -> list[str]:
+def _repeated(features: Sequence[dict[str, Any]], role: str) -> list[str]:
+    """Return a problem for each feature of a role whose id another has."""
     problems: list[str] = []
     seen: dict[str, str] = {}
-    for f in (f for f in features if f["role"] == "area"):
+    for f in (f for f in features if f["role"] == role):
         if f["id"] in seen:
             problems.append(f"{f['place']}: the id {f['id']!r} belongs to {seen[f['id']]} too; give each its own")
         seen[f["id"]] = f["place"]
@@ -361,12 +368,8 @@ def _area_problems(features: Sequence[dict[str, Any]]) -> list[str]:
 
 def _vehicle_problems(features: Sequence[dict[str, Any]], scenario: Scenario) -> list[str]:
     problems: list[str] = []
-    seen: dict[str, str] = {}
     site = scenario.site
     for f, vehicle in zip([f for f in features if f["role"] == "vehicle"], scenario.vehicles, strict=True):
-        if vehicle.id in seen:
-            problems.append(f"{f['place']}: the id {vehicle.id!r} belongs to {seen[vehicle.id]} too; give each its own")
-        seen[vehicle.id] = f["place"]
         for what, xy in (("stands", vehicle.start), ("ends", vehicle.home)):
             point = Point(xy)
             inside = [o.id for o in site.obstacles if vehicle.domain in o.blocks and o.polygon.contains(point)]
@@ -381,11 +384,11 @@ def _vehicle_problems(features: Sequence[dict[str, Any]], scenario: Scenario) ->
     return problems
 
 
-def _task_problems(scenario: Scenario, others: Collection[str]) -> list[str]:
-    ids = [t.id for t in scenario.tasks]
+def _task_problems(tasks: Sequence[Task], others: Collection[str]) -> list[str]:
+    ids = [t.id for t in tasks]
     problems = [f"task {i!r}: its id is given twice" for i in sorted({i for i in ids if ids.count(i) > 1})]
     ids += others
-    for task in scenario.tasks:
+    for task in tasks:
         for before in task.after:
             if before.task not in ids:
                 near = get_close_matches(before.task, ids, n=1)

@@ -4,7 +4,7 @@ Digital twin, shortest ways between all tasks and depots, search for who does wh
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from typing import Any, Literal
 
@@ -107,30 +107,37 @@ def assign(
 
 def _check(scenario: Scenario, weights: Sequence[float], shape: str) -> None:
     """Raise InputError with the first thing that cannot be planned; files are checked by the reader, scenarios here."""
-    tasks, vehicles = scenario.tasks, scenario.vehicles
-    if not tasks:
-        raise InputError('no feature has the role "task"; add a Point with "role": "task" where something is to be done')
-    if not vehicles:
-        raise InputError('no feature has the role "vehicle"; add a Point with "role": "vehicle" where one starts')
     if len(weights) != 4 or not all(np.isfinite(w) and w >= 0 for w in weights):
         raise InputError(f"weights {list(weights)} must be four numbers from 0, for priorities 0 to 3")
     if shape not in SHAPES:
         raise InputError(f"priority function {shape!r} is not one of {', '.join(SHAPES)}")
+    for error in refusals(scenario):
+        raise error
+
+
+def refusals(scenario: Scenario) -> Iterator[InputError]:
+    """Yield why a scenario's tasks cannot be assigned, before long work begins."""
+    tasks, vehicles = scenario.tasks, scenario.vehicles
+    if not tasks:
+        yield InputError('no feature has the role "task"; add a Point with "role": "task" where something is to be done')
+    if not vehicles:
+        yield InputError('no feature has the role "vehicle"; add a Point with "role": "vehicle" where one starts')
+        return
     ids = [t.id for t in tasks]
     for task in tasks:
         unknown = [a.task for a in task.after if a.task not in ids]
         if unknown:
-            raise _impossible(task, f"after names the unknown task {unknown[0]!r}")
+            yield _impossible(task, f"after names the unknown task {unknown[0]!r}")
         if task.priority not in (0, 1, 2, 3):
-            raise _impossible(task, f"priority {task.priority!r} must be 0, 1, 2 or 3")
+            yield _impossible(task, f"priority {task.priority!r} must be 0, 1, 2 or 3")
         if not task.service_time >= 0:
-            raise _impossible(task, f"service_time {task.service_time:g} s must not be negative")
+            yield _impossible(task, f"service_time {task.service_time:g} s must not be negative")
         able = [v for v in vehicles if _may(v, task)]
         if not able:
-            raise _impossible(task, f"{_unable(task)}; no vehicle is and can")
+            yield _impossible(task, f"{_unable(task)}; no vehicle is and can")
         blocks = [o for o in scenario.site.obstacles if o.polygon.contains(Point(task.position))]
-        if blocks and all(any(v.domain in o.blocks for o in blocks) for v in able):
-            raise _impossible(task, f"is inside obstacle {blocks[0].id!r}; move it out")
+        if able and blocks and all(any(v.domain in o.blocks for o in blocks) for v in able):
+            yield _impossible(task, f"is inside obstacle {blocks[0].id!r}; move it out")
 
 
 def _impossible(task: Task, why: str) -> ImpossibleError:

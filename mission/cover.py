@@ -4,7 +4,7 @@ The pipeline of ecdis-sa-darp: WGS84 area and obstacles, grid placement by annea
 coverage, paths.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -60,14 +60,30 @@ def cover(
 def covering(scenario: Scenario, spacing: float | None) -> float:
     """Return the track spacing in metres of a scenario that is to be covered, before long work begins.
 
-    Raises InputError if there is no area or no vehicle, no spacing, or the shares are wrong.
+    Raises InputError with the first of `refusals`.
+    """
+    for _, why in refusals(scenario, spacing):
+        raise InputError(why)
+    return track_spacing(scenario, spacing)
+
+
+def refusals(scenario: Scenario, spacing: float | None = None) -> Iterator[tuple[str, str]]:
+    """Yield why a scenario cannot be covered, before long work begins: no area, no vehicle, wrong shares, no spacing or one
+    that makes too many cells. Each with the role of the features that are to be changed, "" where the line names them.
     """
     if not scenario.site.areas:
-        raise InputError('no feature has the role "area"; draw what is to be covered')
+        yield "", 'no feature has the role "area"; draw what is to be covered'
     if not scenario.vehicles:
-        raise InputError('no feature has the role "vehicle"; add a Point with "role": "vehicle" where one starts')
-    shares(scenario.vehicles)
-    return track_spacing(scenario, spacing)
+        yield "", 'no feature has the role "vehicle"; add a Point with "role": "vehicle" where one starts'
+    else:
+        try:
+            shares(scenario.vehicles)
+        except InputError as error:
+            yield "", str(error)
+    try:
+        track_spacing(scenario, spacing)
+    except InputError as error:
+        yield "area", str(error)
 
 
 def cover_grid(

@@ -12,6 +12,7 @@ from quarterdeck.coverage.lines import Lines, lay_lines, split_area
 from quarterdeck.coverage.metrics import covered_fraction, track_length
 from quarterdeck.coverage.placement import place
 from quarterdeck.coverage.shares import shares
+from quarterdeck.coverage.spread import Spread
 from quarterdeck.geo.deadline import time_is_up
 from quarterdeck.geo.scenario import Scenario, Vehicle
 from quarterdeck.geo.transit import Roadmap, shortest_paths
@@ -47,12 +48,8 @@ def plan_lines(
     drives every nth line and the skipped ones on the way back. `lap`: before the lines, each drives what is in its part of
     one lap along the border and around obstacles, half a spacing in. Raises InputError as `cover` does.
     """
-    step = covering(scenario, spacing)
-    fixed = spacing is not None or scenario.spacing is not None
-    wide = [None] * len(scenario.vehicles) if fixed else spreads(scenario)
-    sounded = [s.widths for s in wide if s is not None]
-    if sounded:
-        step = max(step, float(np.median(np.concatenate(sounded))))  # of the grid that divides; lines have their own
+    step, wide = dividing(scenario, spacing)
+    sounded = any(s is not None for s in wide)
     area = trackable(scenario, step)
     grid = place(area, step, seed=seed, angle=angle).grid
     vehicles, roads = scenario.vehicles, roadmaps(scenario)
@@ -128,6 +125,17 @@ def plan_lines(
         input_hash=scenario.input_hash,
         version=VERSION,
     )
+
+
+def dividing(scenario: Scenario, spacing: float | None) -> tuple[float, list[Spread | None]]:
+    """Return the spacing in metres of the grid that divides, and how far apart each vehicle's lines may be where: None
+    where they are as far apart everywhere. Raises InputError as `mission.cover.covering` does.
+    """
+    step = covering(scenario, spacing)
+    fixed = spacing is not None or scenario.spacing is not None
+    wide: list[Spread | None] = [None] * len(scenario.vehicles) if fixed else spreads(scenario)
+    sounded = [s.widths for s in wide if s is not None]
+    return max(step, float(np.median(np.concatenate(sounded)))) if sounded else step, wide
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,34 +15,56 @@ if TYPE_CHECKING:
 NEAR = 100.0  # m: so near to the work no vehicle is far from it
 
 
-def lacks(scenario: Scenario) -> dict[str, str]:
-    """Return, for each verb that the roles of a site suggest, what keeps it from planning; "" for nothing."""
+def lacks(scenario: Scenario, document: Document) -> dict[str, list[str]]:
+    """Return, for each verb that the roles of a site suggest, all for which it would refuse the site without options."""
+    from quarterdeck.mission.assign import refusals
+
     domains = {v.domain for v in scenario.vehicles}
-    vehicle = "" if domains else 'no vehicle; add a Point with "role": "vehicle" where one starts'
-    found = {"plan": vehicle} if scenario.site.areas else {}
+    found = {"plan": _uncovered(scenario, document)} if scenario.site.areas else {}
     if scenario.tasks:
-        found["assign"] = vehicle
+        found["assign"] = [str(error) for error in refusals(scenario)]
     if scenario.casualties:
-        found["triage"] = (
-            'no UGV to search with; add a vehicle with "domain": "ground"' if "ground" not in domains
-            else 'no medic; add a Point with "role": "medic"' if not scenario.medics
-            else 'no field to search; give the polygon to be searched "role": "area"' if not scenario.site.areas
-            else ""
-        )  # fmt: skip
+        needs = {
+            'no UGV to search with; add a vehicle with "domain": "ground"': "ground" in domains,
+            'no medic; add a Point with "role": "medic"': scenario.medics,
+            'no field to search; give the polygon to be searched "role": "area"': scenario.site.areas,
+        }
+        found["triage"] = [why for why, there in needs.items() if not there]
     return found
 
 
-def notes(scenario: Scenario, document: Document) -> Iterator[str]:
-    """Yield what will have to be given when the site is planned, then what may be a mistake."""
-    blocked = {verb: what for verb, what in lacks(scenario).items() if what}
-    if len(blocked) < len(lacks(scenario)):
-        yield from (f"`{verb}` will need more: {what}" for verb, what in blocked.items())
-    given = scenario.spacing is not None or any(v.sensor is not None for v in scenario.vehicles)
-    if scenario.site.areas and not scenario.casualties and not given:
-        yield (
-            'no spacing: `plan` will need --spacing METRES, or an area the property "spacing", or vehicles a sensor; '
-            "--method guards needs --range METRES, or vehicles the property"
-        )
+def _uncovered(scenario: Scenario, document: Document) -> list[str]:
+    """Return why `plan` refuses the scenario, found as it finds it."""
+    from quarterdeck.api import default_method
+    from quarterdeck.coverage.placement import place
+    from quarterdeck.geo.errors import InputError
+    from quarterdeck.geo.reader import place_of
+    from quarterdeck.mission.cover import covering, refusals, trackable
+    from quarterdeck.mission.lines import dividing
+
+    found = list(refusals(scenario))
+    if not found:
+        step = covering(scenario, None) if default_method(scenario) == "stc" else dividing(scenario, None)[0]
+        try:
+            place(trackable(scenario, step), step)
+        except InputError as error:
+            found = [("area", str(error))]
+    elif all(role == "area" for role, _ in found) and all(v.range is not None for v in scenario.vehicles):
+        return []
+    areas = [(i, f) for i, f in enumerate(document.content["features"]) if f["properties"].get("role") == "area"]
+    where = place_of(*min(areas, key=lambda area: area[1]["properties"].get("spacing") is None))  # the one that says it
+    return [f"{where}: {why}" if role else why for role, why in found]
+
+
+def notes(scenario: Scenario, document: Document, lacking: dict[str, list[str]]) -> Iterator[str]:
+    """Yield what else will have to be given when the site is planned, then what may be a mistake."""
+    from quarterdeck.mission.cover import refusals
+
+    others = {verb: whys for verb, whys in lacking.items() if verb != "plan" or not scenario.casualties}
+    if not all(lacking.values()):  # the field of a drill need not be one to plan
+        yield from (f"`{verb}` will need more: {why}" for verb, whys in others.items() for why in whys)
+    if others.get("plan") == []:  # by guards, then
+        yield from (f"`plan` will need --method guards, or more: {why}" for _, why in refusals(scenario))
     if "aerial" not in {v.domain for v in scenario.vehicles} and scenario.casualties:
         yield 'no UAV: `triage` will need --method no-relay, or a vehicle with "domain": "aerial"'
     yield from far_off(scenario, document)

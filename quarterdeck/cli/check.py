@@ -17,9 +17,10 @@ if TYPE_CHECKING:
 def command(file: str) -> int:
     """List every problem of FILE, a site or a PLAN, one a line.
 
-    For a plan: clear of obstacles, inside the fence, separated in time, energy with a reserve. Exit status 0 if there is
-    none, 2 if a site cannot be planned, 1 if a plan should not be flown. Notes, on standard error, are no problems: what
-    planning will ask for, and what may not be meant.
+    For a site also what `plan` and `assign` would refuse. For a plan: clear of obstacles, inside the fence, separated in
+    time, energy with a reserve. Exit status 0 if there is none, 2 if a site cannot be planned as it is, 1 if a plan should
+    not be flown. Notes, on standard error, are no problems: what another use of the site will ask for, and what may not be
+    meant.
     """
     from quarterdeck.geo.errors import one_line
     from quarterdeck.geo.geojson import opened
@@ -43,18 +44,11 @@ def _of_plan(document: Document) -> list[str]:
 
 def _of_site(document: Document) -> list[str]:
     from quarterdeck.cli.advice import lacks, notes, print_notes
-    from quarterdeck.coverage.shares import shares
-    from quarterdeck.geo.errors import InputError
     from quarterdeck.geo.reader import examine
 
     scenario, problems = examine(document)
     if scenario is None:
         return problems
-    if scenario.vehicles:
-        try:
-            shares(scenario.vehicles)
-        except InputError as error:
-            return [str(error)]
-    print_notes(notes(scenario, document))
-    lacking = lacks(scenario)
-    return sorted(set(lacking.values())) if all(lacking.values()) else []
+    lacking = lacks(scenario, document)
+    print_notes(notes(scenario, document, lacking))
+    return list(dict.fromkeys(why for whys in lacking.values() for why in whys)) if all(lacking.values()) else []

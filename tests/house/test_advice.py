@@ -49,31 +49,96 @@ def test_samples_need_no_advice(capsys, tmp_path, site):
     assert (status, out, len(err.splitlines())) == (0, "", 1)
 
 
-def test_a_site_without_spacing_can_be_planned_with_the_option(capsys, tmp_path):
-    """That is a note, no problem."""
-    status, out, err = checked(capsys, tmp_path, "dalian_harbour", no_spacing)
+def spaced(spacing):
+    """Return the change that gives areas another spacing."""
+    return lambda features: [f["properties"].update(spacing=spacing) for f in features if f["properties"]["role"] == "area"]
+
+
+@pytest.mark.parametrize(
+    ("site", "change", "place"),
+    [
+        ("dalian_harbour", no_spacing, "features[0] ('harbour'): "),
+        ("dalian_harbour", spaced(0.01), "features[0] ('harbour'): "),
+        ("dalian_harbour", spaced(450), "features[0] ('harbour'): "),
+        ("dalian_harbour", without("vehicle"), ""),
+        ("west_ant_island", lambda features: features[-1]["properties"].update(share=0.5), ""),
+    ],
+)
+def test_what_plan_refuses_is_a_problem(capsys, tmp_path, site, change, place):
+    """`check` says, in one line that names the area, what `plan` says when it refuses the site."""
+    status, out, _ = checked(capsys, tmp_path, site, change)
+    _, _, refusal = checked(capsys, tmp_path, site, change, "plan", "-o", "/dev/null")
+    assert status == 2
+    assert out == place + refusal.splitlines()[-1].removeprefix("quarterdeck: ") + "\n"
+
+
+def test_what_assign_refuses_is_a_problem(capsys, tmp_path):
+    """Each task that nobody can do is named, not the first alone."""
+
+    def change(features):
+        for f in features:
+            if f["properties"]["role"] == "task":
+                f["properties"]["needs"] = ["drill"]
+
+    status, out, _ = checked(capsys, tmp_path, "inspection_hall", change)
+    assert status == 2
+    assert out.count("needs drill; no vehicle is and can") == 5
+
+
+def test_guards_need_no_spacing(capsys, tmp_path):
+    """Where all vehicles have a range the site can be planned as it is, by guards: that is a note."""
+
+    def change(features):
+        no_spacing(features)
+        features[-1]["properties"]["range"] = 20
+
+    status, out, err = checked(capsys, tmp_path, "dalian_harbour", change)
     assert (status, out) == (0, "")
-    assert "note: no spacing: `plan` will need --spacing" in err
+    assert "note: `plan` will need --method guards, or more: no spacing" in err
 
 
 @pytest.mark.parametrize(
     ("site", "role", "words"),
     [
-        ("dalian_harbour", "vehicle", "no vehicle"),
-        ("inspection_hall", "vehicle", "no vehicle"),
+        ("dalian_harbour", "vehicle", 'no feature has the role "vehicle"'),
+        ("inspection_hall", "vehicle", 'no feature has the role "vehicle"'),
         ("triage_drill", "medic", "no medic"),
         ("triage_drill", "vehicle", "no UGV"),
     ],
 )
-def test_what_no_option_makes_up_for_is_a_problem(capsys, tmp_path, site, role, words):
-    """A site that nothing can plan is not passed; triage is only one of two uses of a field with vehicles."""
-    status, out, err = checked(capsys, tmp_path, site, without(role))
-    if (site, role) == ("triage_drill", "medic"):
-        assert status == 0
-        assert f"note: `triage` will need more: {words}" in err
-    else:
-        assert status == 2
-        assert words in out
+def test_what_a_verb_cannot_do_without_is_a_problem(capsys, tmp_path, site, role, words):
+    """A site that nothing can plan is not passed."""
+    status, out, _ = checked(capsys, tmp_path, site, without(role))
+    assert status == 2
+    assert words in out
+
+
+def test_the_field_of_a_drill_can_be_planned(capsys, tmp_path):
+    """Triage is only one of two uses of a field with vehicles and a spacing."""
+
+    def change(features):
+        spaced(3)(features)
+        without("medic")(features)
+
+    status, out, err = checked(capsys, tmp_path, "triage_drill", change)
+    assert (status, out) == (0, "")
+    assert "note: `triage` will need more: no medic" in err
+
+
+def test_a_fault_hides_no_other(capsys, tmp_path):
+    """A misspelt property, a wrong model and an open ring are all told, whoever has them; nothing that follows is."""
+
+    def change(features):
+        v1, v2, area = (next(f for f in features if f["id"] == i) for i in ("usv-1", "usv-2", "survey"))
+        v1["properties"] |= {"modell": "otter", "model": "titanic", "domain": "sea", "sensor": {"kind": "camera"}}
+        v2["properties"] |= {"speed": 99, "end": [200, 0]}
+        area["geometry"]["coordinates"][0].pop()
+
+    _, out, _ = checked(capsys, tmp_path, "west_ant_island", change)
+    words = ("unknown property 'modell'", "domain must be one of", "unknown vehicle model 'titanic'",
+             "speed 99 m/s exceeds", "end: longitude 200", "is not closed")  # fmt: skip
+    assert [sum(word in line for line in out.splitlines()) for word in words] == [1] * len(words)
+    assert len(out.splitlines()) == len(words)
 
 
 @pytest.mark.parametrize("verb", [("check",), ("plan", "--spacing", "80", "-o", "/dev/null")])
