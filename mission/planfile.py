@@ -37,6 +37,7 @@ PARAMETERS: dict[str, Any] = {  # those that later steps read
     "edge": Literal["whole", "cells", "lap"],
     "inspect": Literal["area", "border"],
     "range": float | None,
+    "lost_at": dict[str, float],
 }
 LEGS = set(get_args(Leg))
 LISTS = ("leg", "speed", "hold", "time", "task", "ground")  # of a route's waypoints, in the order of its positions

@@ -46,7 +46,7 @@ def replan(
         dead = progress.stand.memory.out & {v.id for v in mission.vehicles} - changes.back.keys()
         changes = replace(changes, lost=changes.lost | dead)
     if not (changes or anew or triage) and as_planned(mission, progress):
-        return _over(mission, with_confirmed(_rest(mission, progress), progress.served), progress.time)
+        return _over(mission, with_confirmed(_rest(mission, progress), progress.served), progress)
     seed = mission.seed if seed is None else seed
     site = changed_site(mission.site, changes)
     vehicles, stranded = _homes(site, _survivors(mission, progress, changes))
@@ -72,16 +72,16 @@ def replan(
         raise InputError(f"a plan made by {mission.method!r} has no survey lines to share out; plan the rest as a site")
     gone = {v.id: _moved(v, progress) for v in (*mission.lost, *mission.vehicles)}
     working = {v.id for v in vehicles}
-    own = after.parameters if triage else mission.parameters
+    own = after.parameters if triage else _lasting(mission)
     after = replace(
         after,
         routes=tuple(_airborne(r, v, progress) for v, r in zip(vehicles, after.routes, strict=True)),
-        parameters=dict(own) | {"replanned_at": progress.time, "lost": sorted(changes.lost)},
+        parameters={**own, "replanned_at": progress.time, "lost": sorted(changes.lost)},
         seed=seed,
         reasons=(*(r for r in stranded if r.about not in own.get("medics", ())), *after.reasons),
         lost=tuple(v for i, v in gone.items() if i not in working),
     )
-    return _over(mission, after, progress.time)
+    return _over(mission, after, progress)
 
 
 def _survivors(mission: Mission, progress: Progress, changes: Changes) -> tuple[Vehicle, ...]:
@@ -149,7 +149,7 @@ def _rest(mission: Mission, progress: Progress) -> Mission:
     routes = tuple(_route_left(r, progress, mission.vehicle(r.vehicle)) for r in mission.routes)
     vehicles, lost = (tuple(_moved(v, progress) for v in some) for some in (mission.vehicles, mission.lost))
     reasons = [reason for v, r in zip(vehicles, routes, strict=True) for reason in shortfalls(v, r)]
-    told = dict(mission.parameters) | {"replanned_at": progress.time, "lost": []}
+    told = _lasting(mission) | {"replanned_at": progress.time, "lost": []}
     surveyed = () if mission.spacing is None else with_surveyed(mission, progress.tracks)
     return replace(
         mission,
@@ -163,6 +163,11 @@ def _rest(mission: Mission, progress: Progress) -> Mission:
         bounds={},
         reasons=(*(r for r in mission.reasons if r.kind != "energy"), *reasons),
     )
+
+
+def _lasting(mission: Mission) -> dict[str, Any]:
+    """Return a plan's parameters without what was told in a run of it (`mission.told.as_told`)."""
+    return {name: value for name, value in mission.parameters.items() if name not in ("told_at", "lost_at")}
 
 
 def _figures_left(mission: Mission, routes: tuple[Route, ...], surveyed: tuple[LineString, ...]) -> dict[str, Any]:
@@ -196,12 +201,17 @@ def _route_left(route: Route, progress: Progress, vehicle: Vehicle) -> Route:
     return Route(route.vehicle, (start, *moved), energy)
 
 
-def _over(mission: Mission, after: Mission, time: float) -> Mission:
-    """Return the mission from `time` on, with a note where nobody has anything left to do."""
+def _over(mission: Mission, after: Mission, progress: Progress) -> Mission:
+    """Return the mission from now on, with a note where nobody has anything left to do."""
     if any(r.duration > 0 for r in after.routes):
         return after
     end = max(r.duration for r in mission.routes)
-    note = "nothing is left to do" + (f": the plan was over at {end:,.0f} s" if time >= end else "")
+    note = "nothing is left to do, and nobody moves in this plan: all is done, or told as left out"
+    if progress.along is None and progress.stand is None and progress.time >= end:
+        note = (
+            "nothing is left to do, and nobody moves in this plan: by the times of the one before all was done at "
+            f"{end:,.0f} s; if that is not what happened, say what did with --track or --state"
+        )
     return replace(after, figures={**after.figures, "notes": [*after.figures.get("notes", ()), note]})
 
 

@@ -42,17 +42,19 @@ def _places(way: Sequence[Waypoint]) -> list[tuple[int, tuple[float, float, floa
     return [(i, place) for i, place in enumerate(at) if at[i + 1 : i + 2] != [place]]
 
 
-def as_told(mission: Mission, told: Sequence[Telling]) -> Mission:
+def as_told(mission: Mission, told: Sequence[Telling], reliefs: Sequence[Telling] = ()) -> Mission:
     """Return the mission with the routes that its vehicles were told in a run, one after the other, times from its start.
 
     Who was told nothing has the route that it had: it may not have heard that others are to do the rest of it. A task is on
     the route to which it was given last, and on none if it is not asked for any more: `mission` has those that are.
+    `reliefs` are of who was lost, when its part was given to others: its route ends there, and the parameter `lost_at` has
+    the second, by id.
     """
     guards = list(mission.guards)
     routes = {r.vehicle: r for r in mission.routes}
     begins = dict.fromkeys(routes, 0)  # the waypoint at which the route that was told last begins
     given = {w.task: r.vehicle for r in mission.routes for w in r.waypoints if w.task}
-    for telling in told:
+    for telling in (*told, *reliefs):
         name, new = telling.route.vehicle, _renumbered(telling, guards)
         given |= {w.task: name for w in new if w.task}
         had = routes[name].waypoints
@@ -73,7 +75,11 @@ def as_told(mission: Mission, told: Sequence[Telling]) -> Mission:
         mission,
         routes=tuple(routes.values()),
         guards=tuple(replace(g, vehicle=v, turn=turn) for g, (v, turn) in zip(guards, whose, strict=True)),
-        parameters={**mission.parameters, "told_at": sorted({t.time for t in told})},
+        parameters={
+            **mission.parameters,
+            "told_at": sorted({t.time for t in (*told, *reliefs)}),
+            "lost_at": {t.route.vehicle: t.time for t in reliefs},
+        },
         figures={
             **mission.figures,
             "makespan": max((r.duration for r in routes.values()), default=0.0),

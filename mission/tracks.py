@@ -134,7 +134,9 @@ def record(mission: Mission, files: Sequence[Sequence[tuple[str, Log]]], *, star
     reasons += [] if triage else map(Reason, _on_other_routes(mission, tracks))
     lost = []
     for vehicle in mission.lost:  # it has no route: its clock is the others', or the mission's
-        if vehicle.id in logs:
+        if vehicle.id not in logs:
+            notes.append(f"{vehicle.id}: lost before this plan began; it has no route in it, and nothing is expected of it")
+        else:
             whole = _joined(vehicle.id, logs[vehicle.id])
             track, told, wrong = cleaned(mission, vehicle, whole)
             notes += [*told, *wrong]

@@ -52,8 +52,9 @@ def report_tracks(
     if mission.method == METHOD:
         return _triage_tracks(mission, record, trace, notes, limits or {}, settings or {})
     served = served_tasks(mission, record.tracks)
-    arrived = {t.vehicle for t in record.tracks if np.isfinite(t.arrived)}
-    short = [t for t in record.tracks if t.vehicle not in arrived]
+    gone: dict[str, float] = mission.parameters.get("lost_at", {})
+    arrived = {t.vehicle for t in record.tracks if np.isfinite(t.arrived)} - gone.keys()
+    short = [t for t in record.tracks if t.vehicle not in arrived | gone.keys()]
     notes += [f"{t.vehicle}: its log ends at {t.time[-1]:,.0f} s, before it was home" for t in short]
     report = measure(
         mission,
@@ -62,6 +63,8 @@ def report_tracks(
         aground=[False] * len(mission.vehicles),
         served={task: when for task, (when, _) in served.items()},
         servers={task: vehicle for task, (_, vehicle) in served.items()},
+        lost=[v.id in gone for v in mission.vehicles],
+        relieved=gone,
         limits=limits or {},
         settings=settings or {},
         trouble=[str(r) for r in record.reasons],

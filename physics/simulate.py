@@ -160,8 +160,8 @@ def simulate(
     dead = {v for v, gone in zip(ids, (run.lost | run.aground).tolist(), strict=True) if gone}
     reliefs = [relief for v, relief in relieved(run.memory).items() if v in dead]
     heeded = [wish for when, wish in changes if when <= run.time]
-    orders = (*tellings(run.memory), *reliefs)
-    told = as_told(asked_for(plan, heeded), orders) if heeded or orders else plan
+    orders = tellings(run.memory)
+    told = as_told(asked_for(plan, heeded), orders, reliefs) if heeded or orders or reliefs else plan
     served, servers = run.served, run.servers
     if told is not plan and plan.method == "guards":  # each plan numbers its guards anew
         found = served_tasks(told, trace.tracks())

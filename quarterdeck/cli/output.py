@@ -113,19 +113,21 @@ def print_figures(mission: Mission) -> None:
     """Print a plan's figures and each vehicle's on standard error."""
     screen = console()
     table = Table(title=f"{mission.name}: {mission.method}", title_justify="left")
-    for column in ("vehicle", "share", "length", "time", "energy"):
-        table.add_column(column, justify="left" if column == "vehicle" else "right")
     shares = mission.figures.get("shares")
+    for column in ("vehicle", *(("share",) if shares is not None else ()), "length", "time", "energy"):
+        table.add_column(column, justify="left" if column == "vehicle" else "right")
     for i, route in enumerate(mission.routes):
-        share = f"{100 * shares[i]:.2f} %" if shares is not None else ""
+        share = [f"{100 * shares[i]:.2f} %"] if shares is not None else []
         table.add_row(
-            route.vehicle, share, f"{route.length / 1000:.2f} km", minutes(route.duration), f"{route.energy:.0f} Wh"
+            route.vehicle, *share, f"{route.length / 1000:.2f} km", minutes(route.duration), f"{route.energy:.0f} Wh"
         )
     screen.print(table)
     known = {n: f for n, f in WORDS.items() if mission.figures.get(n) is not None}
     screen.print(
         "; ".join(f"{label} {form.format(mission.figures[n] * factor)}" for n, (label, form, factor) in known.items())
     )
+    if before := covered_before(mission):
+        print_reason(screen, "covered before", f"{before:.2%}, which the coverage counts too")
     if paper := mission.figures.get("paper"):
         least, bound = mission.bounds["guards"], mission.bounds["makespan"]
         unseen = mission.figures["certificate"]["uncovered"]
@@ -138,6 +140,17 @@ def print_figures(mission: Mission) -> None:
     print_cut(mission)
     for reason in mission.reasons:
         print_reason(screen, "infeasible", reason)
+
+
+def covered_before(mission: Mission) -> float:
+    """Return the part of the area that was covered before a replanned mission begins, from 0 to 1."""
+    from shapely import get_coordinates
+
+    from quarterdeck.coverage.metrics import covered_fraction
+
+    if mission.spacing is None:
+        return 0.0
+    return covered_fraction([get_coordinates(line) for line in mission.surveyed], mission.site.coverable, mission.spacing)
 
 
 def print_cut(mission: Mission) -> None:

@@ -215,11 +215,12 @@ def remade(plan: Mission, scenario: Scenario, file: str, site: str) -> Mission:
     own_map = options.pop("map", "site") != "site"
     if (
         own_map
-        or {"replanned_at", "sortie", "terrain"} & set(options)
+        or {"replanned_at", "told_at", "sortie", "terrain"} & set(options)
         or plan.method not in ("stc", "lines", "guards", "assign", TRIAGE)
     ):
         raise InputError(
-            f"{file}: was not made of a site alone (replanned, over terrain, on a map, or by hand); plan it as it was"
+            f"{file}: was not made of a site alone (replanned, told in a run, over terrain, on a map, or by hand); "
+            "plan it as it was"
         )
     scenario = replace(scenario, name=plan.name)
     try:

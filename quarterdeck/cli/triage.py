@@ -90,7 +90,10 @@ _FROM_ZERO = Real(min=0, max=1e9)
 @click.option("--fail", "fails", type=AtTime(), multiple=True, help="A robot, or a medic's device, fails; repeatable.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON on standard error instead of a table.")
 @click.option(
-    "--generate", metavar="N", type=click.IntRange(min=1), help="Make N cases instead, from SITE or the paper's field."
+    "--generate",
+    metavar="N",
+    type=click.IntRange(min=1),
+    help="Make N cases instead, from SITE or the paper's field: into the folder -o, or one as the file -o ....geojson.",
 )
 @click.option("--casualties", nargs=2, type=click.IntRange(min=0), default=(8, 14), show_default=True,
               help="Fewest and most of a generated case.")  # fmt: skip
@@ -181,23 +184,28 @@ def _run(scenario: Scenario, settings: Settings, seed: int, output: str, force: 
 
 
 def _generate(scenario: Scenario, count: int, seed: int, output: str, force: bool, options: dict[str, Any]) -> int:
-    """Write cases of consecutive seeds: one to the output, several into a folder."""
+    """Write cases of consecutive seeds into the folder that the output names; one case also to the output itself, where
+    that is standard output or named as GeoJSON is.
+    """
     from quarterdeck.geo.files import safe_names, write_files
     from quarterdeck.geo.writer import site_text
     from quarterdeck.mission.triage.generate import generate
 
-    if count > 1 and output == "-":
+    there = Path(output).exists() and not Path(output).is_dir()
+    alone = output == "-" or there or Path(output).suffix in (".geojson", ".json")
+    if count > 1 and alone:
         raise click.UsageError(f"--generate {count} writes {count} files; name their folder with -o")
     made = {
         s: site_text(generate(scenario, s, casualties=options["casualties"], clustered=options["clustered"]))
         for s in range(seed, seed + count)
     }
-    if count == 1:
+    if alone:
         emit(made[seed], output, force=force)
         return 0
     name = safe_names([scenario.name])[scenario.name]
     write_files({Path(output) / f"{name}-{s:06d}.geojson": text for s, text in made.items()}, force=force)
-    console().print(f"{count} cases, seeds {seed} to {seed + count - 1}, in {output}")
+    told = "1 case, seed" if count == 1 else f"{count} cases, seeds {seed} to"
+    console().print(f"{told} {seed + count - 1}, in {output}", soft_wrap=True)
     return 0
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from quarterdeck.cli.output import console, minutes, print_reason
+from quarterdeck.cli.output import console, covered_before, minutes, print_reason
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -61,6 +61,8 @@ def print_report(mission: Mission, report: Report, *, how: str = "simulated") ->
             f"{figures['map_walls_right']:.1%} of the walls"
         )
     screen.print("; ".join(words))
+    if before := covered_before(mission):
+        print_reason(screen, "covered before", f"{before:.2%}, which does not count here: the plan goes on from there")
     if (fast := figures.get("time_fast")) is not None:
         _print_beside(screen, report, fast)
     for note in report.notes:

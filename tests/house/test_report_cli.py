@@ -127,6 +127,32 @@ def test_replan_from_logs_and_from_the_report(flown, tmp_path, capsys):
     assert gone in {v.id for v in read_plan(str(tmp_path / "without.geojson")).lost}
 
 
+def test_who_was_lost_is_named(tmp_path, capsys):
+    """By the plan as told: who, and when its part was given away; by a plan of the survivors: who is not in it."""
+    plan, trace, told, rest, track = (tmp_path / n for n in ("plan", "run.npz", "told", "rest", "rest.npz"))
+    assert run("plan", DATA / "plant_yard.geojson", "--spacing", 8, "-o", plan) == 0
+    assert "share" in capsys.readouterr().err
+    run("simulate", plan, "--recover", "--fail", "lost:ugv-2@100", "--trace", trace, "--told", told)
+    simulated = capsys.readouterr().err
+    assert "note: ugv-2: lost; at 130 s others were given its part" in simulated
+    assert run("report", told, "--track", trace) == 0
+    driven = capsys.readouterr().err
+    assert "finished 1 of 2; lost 1" in " ".join(driven.split())
+    assert "note: ugv-2: lost; at 130 s others were given its part" in driven
+    assert run("replay", told, "--site", DATA / "plant_yard.geojson") == 2
+    assert "told in a run" in capsys.readouterr().err
+    assert run("replan", plan, "--at", 100, "--lost", "ugv-2", "-o", rest) == 0
+    again = capsys.readouterr().err
+    assert "covered before: " in again
+    assert "share" not in again
+    assert run("simulate", rest, "--trace", track) == 0
+    assert "covered before: " in capsys.readouterr().err
+    assert run("report", rest, "--track", track) == 0
+    assert "ugv-2: lost before this plan began" in capsys.readouterr().err
+    assert run("replan", told, "--at", 100, "-o", tmp_path / "later") == 0
+    assert "lost_at" not in read_plan(str(tmp_path / "later")).parameters
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

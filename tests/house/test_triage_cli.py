@@ -76,6 +76,8 @@ def test_generated_cases_are_readable_seeded_sites(tmp_path: Path, capsys: pytes
     assert [p.read_bytes() for p in made] == [p.read_bytes() for p in sorted((tmp_path / "b").iterdir())]
     assert len({p.read_bytes() for p in made}) == 4
     assert all(3 <= len(read_scenario(p).casualties) <= 5 for p in made)
+    assert run(capsys, "--generate", "1", "--seed", "7", "-o", str(tmp_path / "one"))[0] == 0
+    assert [p.name for p in (tmp_path / "one").iterdir()] == [made[0].name]
 
 
 @pytest.mark.parametrize(
@@ -87,6 +89,7 @@ def test_generated_cases_are_readable_seeded_sites(tmp_path: Path, capsys: pytes
         (["SITE", "--fail", "uav9@3"], "uav9"),
         (["SITE", "--treat", "blue=3"], "COLOUR=SECONDS"),
         (["--generate", "2"], "name their folder"),
+        (["--generate", "2", "-o", "drill.geojson"], "name their folder"),
         (["--generate", "1", "--casualties", "5", "3"], "fewest and the most"),
     ],
 )
