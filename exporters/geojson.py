@@ -17,7 +17,8 @@ from shapely.geometry.base import BaseGeometry
 from quarterdeck.exporters.export import Settings
 from quarterdeck.exporters.places import file_stems
 from quarterdeck.geo.frame import Frame
-from quarterdeck.geo.palette import FILL, SITE, TASK, colours
+from quarterdeck.geo.palette import FILL, SITE, TASK
+from quarterdeck.mission.layers import fleet_colours
 from quarterdeck.mission.mission import Mission, Route
 
 SURVEY_WIDTH, TRANSIT_WIDTH = 3, 1.5
@@ -46,7 +47,9 @@ def site_features(mission: Mission) -> Iterator[dict[str, Any]]:
 def route_features(mission: Mission) -> Iterator[dict[str, Any]]:
     """Yield each vehicle's runs of legs, and its start with the route's figures."""
     frame = mission.frame
-    for route, colour in zip(mission.routes, colours(len(mission.routes)), strict=True):
+    palette = fleet_colours(mission)
+    for route in mission.routes:
+        colour = palette[route.vehicle]
         yield from _legs(frame, route, colour)
         figures: dict[str, Any] = {"length_m": round(route.length, 1), "duration_s": round(route.duration, 1)}
         figures |= {"energy_Wh": round(route.energy, 2), "marker-color": colour, "marker-symbol": "circle"}

@@ -12,7 +12,8 @@ from lxml import etree
 
 from quarterdeck.exporters.export import Settings
 from quarterdeck.exporters.places import degrees, file_stems, printable
-from quarterdeck.geo.palette import FILL, SITE, colours
+from quarterdeck.geo.palette import FILL, SITE
+from quarterdeck.mission.layers import fleet_colours
 from quarterdeck.mission.mission import Mission, Route
 
 SPACE = "http://www.opengis.net/kml/2.2"
@@ -45,10 +46,11 @@ def _document(mission: Mission) -> str:
             for side, ring in (("outer", part.exterior), *(("inner", r) for r in part.interiors)):
                 linear = _add(_add(polygon, f"{side}BoundaryIs"), "LinearRing")
                 _add(linear, "coordinates", _text(degrees(mission.frame, np.asarray(ring.coords)[:, :2])))
-    for route, colour in zip(mission.routes, colours(len(mission.routes)), strict=True):
+    palette = fleet_colours(mission)
+    for route in mission.routes:
         folder = _add(document, "Folder")
         _add(folder, "name", printable(route.vehicle))
-        _route(folder, mission, route, colour)
+        _route(folder, mission, route, palette[route.vehicle])
     return str(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True), "utf-8")
 
 

@@ -16,6 +16,12 @@ from quarterdeck.geo.frame import Frame
 NAME_SIZE = 6.5  # points
 
 
+def clock(seconds: float) -> str:
+    """Return seconds as m:ss, or h:mm:ss."""
+    hours, rest = divmod(round(seconds), 3600)
+    return f"{hours}:{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"
+
+
 def fill(chart: Axes, geometry: BaseGeometry, **style: Any) -> None:
     """Add a patch for each polygon of a geometry in metres, holes left out."""
     for polygon in getattr(geometry, "geoms", [geometry]):

@@ -1,33 +1,25 @@
-"""The column beside a map: a row of figures for each vehicle, and the legend."""
+"""The column beside a map: a row of figures for each vehicle, what happened, and the legend."""
 
-from typing import Any
+from collections.abc import Mapping, Sequence
+from textwrap import wrap
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
-from quarterdeck.geo.palette import SITE
-from quarterdeck.mission.layers import drawn
-from quarterdeck.mission.mission import Layer, Mission, Route
+from quarterdeck.exporters.map_furniture import clock
+from quarterdeck.exporters.map_site import Sign
+from quarterdeck.mission.mission import Mission, Route
 from quarterdeck.physics.report import Report
 
-WATER, AREA, OBSTACLE, MISSED, STRANGE = "#f4f7fa", "#dcebf5", "#8c8c8c", "#d7191c", "#111111"
-TASK: dict[str, Any] = {"marker": "s", "color": "black", "markerfacecolor": "#ffffb2", "markersize": 4, "linestyle": "none"}
-START: dict[str, Any] = {"marker": "o", "color": "white", "markeredgecolor": "black", "linestyle": "none"}
-CONTACT: dict[str, Any] = {
-    "marker": "X",
-    "color": "#d7191c",
-    "markeredgecolor": "white",
-    "markersize": 8,
-    "linestyle": "none",
-}
 _COLUMNS = (0.0, 0.075, 0.105, 0.58, 0.70, 0.88, 1.0)  # colour, number, name, length, survey, time, energy
 _ROWS_FULL_SIZE = 26  # rows of the table that stand in the usual type; more are set smaller
 
 
-def table(panel: Axes, mission: Mission, palette: list[str], report: Report | None = None) -> None:
-    """Set one row a vehicle, and their sum: number, name, length, survey part (of a run: off it), time, energy."""
+def table(panel: Axes, mission: Mission, palette: Mapping[str, str], report: Report | None = None) -> float:
+    """Set one row a vehicle, and their sum: number, name, length, survey part (of a run: off it), time, energy.
+
+    Return where it ends, as a part of the panel.
+    """
     panel.set_axis_off()
     panel.set_xlim(0, 1)
     panel.set_ylim(0, 1)
@@ -38,12 +30,13 @@ def table(panel: Axes, mission: Mission, palette: list[str], report: Report | No
     for x, text in zip(_COLUMNS[3:], ("km", "survey" if report is None else "off, m", "time", "Wh"), strict=True):
         panel.text(x, y, text, fontsize=size, ha="right", va="center", color="#555555")
     rows = _planned(mission) if report is None else _run(report)
-    for number, (row, colour) in enumerate(zip(rows, palette, strict=False), 1):
+    for number, row in enumerate(rows[:-1], 1):
         y -= pitch
-        panel.plot([_COLUMNS[0], 0.035], [y, y], color=colour, linewidth=2.5 if count <= _ROWS_FULL_SIZE else 1.8)
+        panel.plot([_COLUMNS[0], 0.035], [y, y], color=palette[row[0]], linewidth=2.5 if count <= _ROWS_FULL_SIZE else 1.8)
         name = row[0] if len(row[0]) <= 22 else row[0][:21] + "…"
         _row(panel, y, size, (str(number), name, *row[1:]))
     _row(panel, y - pitch, size, ("", *rows[-1]), weight="bold")
+    return y - 1.5 * pitch
 
 
 def _planned(mission: Mission) -> list[tuple[str, ...]]:
@@ -80,9 +73,7 @@ def _percent(part: float, whole: float) -> str:
 
 
 def _figures(length: float, middle: str, duration: float, energy: float) -> tuple[str, str, str, str]:
-    hours, rest = divmod(round(duration), 3600)
-    time = f"{hours}:{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"
-    return f"{length / 1000:.2f}", middle, time, f"{energy:.0f}"
+    return f"{length / 1000:.2f}", middle, clock(duration), f"{energy:.0f}"
 
 
 def _row(panel: Axes, y: float, size: float, texts: tuple[str, ...], *, weight: str = "normal") -> None:
@@ -90,37 +81,22 @@ def _row(panel: Axes, y: float, size: float, texts: tuple[str, ...], *, weight: 
         panel.text(x, y, text, fontsize=size, ha=side, va="center", weight=weight, parse_math=False)
 
 
-def legend(panel: Axes, mission: Mission, *, run: bool = False, strange: bool = False) -> None:
-    """Say what the map's lines and fills are."""
-    handles: list[Any] = [
-        Line2D([], [], color="#333333", linewidth=1.8, label="survey"),
-        Line2D([], [], color="#333333", linewidth=0.9, alpha=0.75, label="transit, turn"),
-        Line2D([], [], **START, markersize=4, label="start"),
-        Patch(facecolor=AREA, edgecolor=SITE["area"], label="area"),
-        Patch(facecolor=WATER, edgecolor=SITE["operating"], linestyle="--", label="operating area"),
-    ]
-    if mission.site.obstacles:
-        handles.append(Patch(facecolor=OBSTACLE, edgecolor=SITE["obstacle"], label="obstacle"))
-    if strange:
-        handles.append(Patch(facecolor=STRANGE, edgecolor=STRANGE, label="obstacle that the plan did not know"))
-    if mission.tasks:
-        handles.append(Line2D([], [], **TASK, label="task"))
-    handles += [_key(layer) for layer in drawn(mission) if any("stroke" in p for p in layer.properties)]
-    if run:
-        handles[0:2] = [
-            Line2D([], [], color="#333333", linewidth=1.2, label="driven"),
-            Line2D([], [], color="#333333", linewidth=1.2, alpha=0.3, label="planned"),
-        ]
-        handles += [
-            Patch(facecolor=MISSED, label="missed of the plan's swaths"),
-            Line2D([], [], **CONTACT, label="contact"),
-        ]
-    panel.legend(handles=handles, loc="lower left", ncols=2, fontsize=7, frameon=False, borderaxespad=0.0)
+def legend(panel: Axes, signs: Sequence[Sign]) -> float:
+    """Say what the map's lines, signs and fills are: of those that it has alone. Return its top, as a part of the panel."""
+    shown = panel.legend(handles=list(signs), loc="lower left", ncols=2, fontsize=7, frameon=False, borderaxespad=0.0,
+                         columnspacing=1.2, handletextpad=0.6)  # fmt: skip
+    box = shown.get_window_extent()
+    return float(panel.transAxes.inverted().transform((box.x0, box.y1))[1])
 
 
-def _key(layer: Layer) -> Patch | Line2D:
-    """The sign of a layer that has a colour of its own: what was surveyed before, what is undone, a triangulation."""
-    colour = next(p["stroke"] for p in layer.properties if "stroke" in p)
-    if all(geometry.geom_type.endswith("Polygon") for geometry in layer.geometries):
-        return Patch(facecolor=colour, alpha=0.16, label=layer.name)
-    return Line2D([], [], color=colour, linewidth=0.9, label=layer.name)
+def happenings(panel: Axes, lines: Sequence[tuple[str, str]], low: float, high: float) -> None:
+    """Set lines, each a time or a head and what is said, between two heights of the panel; what has no room is counted."""
+    pitch, width = 0.022, 54
+    room = int((high - low) / pitch) - 1
+    rows = [(head if n == 0 else "", text) for head, words in lines for n, text in enumerate(wrap(words, width) or [""])]
+    if len(rows) > room:
+        rows = [*rows[: max(room - 1, 0)], ("", f"and {len(rows) - max(room - 1, 0)} lines more: see the report")]
+    for n, (head, text) in enumerate(rows[: max(room, 0)]):
+        y = high - (n + 1) * pitch
+        panel.text(0.0, y, head, fontsize=7, va="center", weight="bold", parse_math=False)
+        panel.text(0.17, y, text, fontsize=7, va="center", parse_math=False)

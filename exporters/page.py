@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from quarterdeck.exporters.export import Settings
 from quarterdeck.exporters.places import file_stems, spacing_words
-from quarterdeck.geo.palette import colours
+from quarterdeck.mission.layers import fleet_colours
 from quarterdeck.mission.mission import Mission, Route
 
 
@@ -23,7 +23,7 @@ def page(mission: Mission) -> str:
     """Return the page. The map is SVG in metres, y to the south; the pointer's degrees come from the map's corners."""
     low, high = _extent(mission)
     size = high - low
-    palette = colours(len(mission.routes))
+    palette = fleet_colours(mission)
     corners = np.array([[low[0], high[1]], [high[0], high[1]], [low[0], low[1]], [high[0], low[1]]])
     degrees = mission.frame.to_degrees(corners)
     degrees[:, 0] = np.unwrap(degrees[:, 0], period=360.0)
@@ -35,7 +35,7 @@ def page(mission: Mission) -> str:
     }
     state = "feasible" if mission.feasible else "INFEASIBLE: " + "; ".join(map(str, mission.reasons))
     spacing = "" if mission.spacing is None else f", {spacing_words(mission)}"
-    routes = [(i, route, colour) for i, (route, colour) in enumerate(zip(mission.routes, palette, strict=True))]
+    routes = [(i, route, palette[route.vehicle]) for i, route in enumerate(mission.routes)]
     parts = {
         "TITLE": escape(mission.name),
         "LINE": escape(f"{mission.method}{spacing}, seed {mission.seed}: {state}"),

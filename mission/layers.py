@@ -1,10 +1,12 @@
 """A mission's layers as a PLAN and a picture have them: those for the eye, and those that replanning starts from."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from shapely import LineString, Point
 
+from quarterdeck.geo.palette import colours_of
 from quarterdeck.mission.mission import Guard, Layer, Mission
 
 LEFT_OUT = {"stroke": "#d62728"}
@@ -24,6 +26,17 @@ def drawn(mission: Mission) -> tuple[Layer, ...]:
         Layer("surveyed", mission.surveyed, (SURVEYED,) * len(mission.surveyed)),
     )
     return tuple(layer for layer in kept if layer.geometries)
+
+
+def left_undone(mission: Mission) -> Mission:
+    """Return the mission with no layers but those of what it leaves undone."""
+    return replace(mission, guards=(), surveyed=(), layers=tuple(x for x in mission.layers if x.name == "undone"))
+
+
+def fleet_colours(mission: Mission) -> dict[str, str]:
+    """Return each vehicle's colour by its id; those who were given up have theirs, so that the others keep their own."""
+    ids = [v.id for v in (*mission.vehicles, *mission.lost)] + [r.vehicle for r in mission.routes]
+    return colours_of(ids, casualties=bool(mission.casualties))
 
 
 def undrawn(layers: Mapping[str, Sequence[tuple[Any, Mapping[str, Any]]]]) -> dict[str, Any]:

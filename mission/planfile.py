@@ -21,12 +21,12 @@ from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.geojson import Document, opened
 from quarterdeck.geo.kinds import kind_of_json
 from quarterdeck.geo.models import VehicleModel
-from quarterdeck.geo.palette import CASUALTY, colours
+from quarterdeck.geo.palette import CASUALTY
 from quarterdeck.geo.properties import PROPERTIES, property_problems
 from quarterdeck.geo.reader import MAX_RADIUS
 from quarterdeck.geo.scenario import Area, Casualty, Obstacle, Precedence, Sensor, Site, Task, Vehicle, as_multipolygon
 from quarterdeck.geo.typed import fits, wrong_field
-from quarterdeck.mission.layers import drawn, undrawn
+from quarterdeck.mission.layers import drawn, fleet_colours, undrawn
 from quarterdeck.mission.mission import Leg, Mission, Route, Waypoint
 from quarterdeck.mission.reason import HEADS, Reason, reason_of
 
@@ -97,12 +97,12 @@ def _site(mission: Mission) -> list[dict[str, Any]]:
 def _fleet(mission: Mission) -> list[dict[str, Any]]:
     frame = mission.frame
     features = []
-    fleet = [*(("vehicle", v) for v in mission.vehicles), *(("lost", v) for v in mission.lost)]
-    for (role, v), colour in zip(fleet, colours(len(fleet)), strict=True):
+    palette = fleet_colours(mission)
+    for role, v in (*(("vehicle", v) for v in mission.vehicles), *(("lost", v) for v in mission.lost)):
         given: dict[str, Any] = {"model": _plain(asdict(v.model))} | {n: getattr(v, n) for n in VEHICLE_FIGURES}
         given |= {"ceiling": v.ceiling, "ceiling_amsl": v.ceiling_amsl} if v.domain == "aerial" else {}
         given |= {"sensor": asdict(v.sensor) if v.sensor else None, "can": sorted(v.can), "returns": v.returns}
-        given |= {"end": position(frame, v.end) if v.end else None, "marker-color": colour}
+        given |= {"end": position(frame, v.end) if v.end else None, "marker-color": palette[v.id]}
         features.append(point_feature(frame, role, v.start, v.id, **_plain(given)))
     for t in mission.tasks:
         given = {k: v for k, v in asdict(t).items() if k not in ("id", "position")} | {"needs": sorted(t.needs)}
@@ -126,7 +126,8 @@ def _layers(mission: Mission) -> list[dict[str, Any]]:
 
 def _routes(mission: Mission) -> list[dict[str, Any]]:
     features = []
-    for route, colour in zip(mission.routes, colours(len(mission.routes)), strict=True):
+    palette = fleet_colours(mission)
+    for route in mission.routes:
         xyz = route.xyz
         lonlat = degrees(mission.frame, xyz[:, :2])
         with_z = bool(np.any(xyz[:, 2] != 0))
@@ -139,7 +140,7 @@ def _routes(mission: Mission) -> list[dict[str, Any]]:
             if all(value is None for value in lists[name]):
                 del lists[name]
         figures = {"energy": route.energy, "length": round(route.length, 2), "duration": round(route.duration, 2)}
-        look: dict[str, Any] = {"stroke": colour, "stroke-width": 2}
+        look: dict[str, Any] = {"stroke": palette[route.vehicle], "stroke-width": 2}
         drawn = {"type": "LineString", "coordinates": line if len(line) > 1 else line * 2}
         features.append(feature("route", drawn, vehicle=route.vehicle, **look, **_plain(figures), **_plain(lists)))
     return features

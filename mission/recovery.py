@@ -308,6 +308,12 @@ def left_out(memory: Any) -> tuple[Reason, ...]:
     return memory.mission.reasons if isinstance(memory, _Memory) and memory.tellings else ()
 
 
+def followed(memory: Any) -> Mission | None:
+    """Return the last plan that a director made in a run; None where it made none."""
+    memory = _unwrapped(memory)
+    return memory.mission if isinstance(memory, _Memory) and memory.tellings else None
+
+
 def asked_for(mission: Mission, wishes: Sequence[Changes]) -> Mission:
     """Return the mission with the site and the tasks that are asked for after changes in a run, one after the other.
 

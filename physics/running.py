@@ -76,6 +76,7 @@ class Running:
         self.change, self.suffering = -1.0, active((), self.ids, 0.0)
         self.aerial = np.array([v.domain == "aerial" for v in vehicles])
         self.lost, self.given_up = np.zeros(self.count, bool), np.zeros(self.count, bool)  # given_up: the director knows
+        self.gone = np.full(self.count, np.inf)  # s: when it was lost, or ended otherwise
         self.events: list[Event] = []  # not yet told to the director
         self.heard: dict[str, State] = {}
         self.undelivered: dict[str, Command] = {}
@@ -168,6 +169,7 @@ class Running:
         self.events += self._held()
         self.events += [Event("lost", self.ids[i]) for i in np.flatnonzero(self.aground & ~self.given_up & ~self.lost)]
         self.given_up |= self.aground
+        self.gone[(self.aground | self.lost) & np.isinf(self.gone)] = self.time
         mute = dict(zip(self.ids, self.suffering["comms"].tolist(), strict=True))
         if self.lookout is not None:  # each decides for itself: what passes between them is the director's business
             mute = dict.fromkeys(self.ids, False)

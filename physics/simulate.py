@@ -16,13 +16,14 @@ from quarterdeck.mission.director import Director
 from quarterdeck.mission.fast import run_fast
 from quarterdeck.mission.inspection import default_director
 from quarterdeck.mission.mission import Mission
-from quarterdeck.mission.recovery import asked_for, left_out, relieved, tellings, undone
+from quarterdeck.mission.recovery import asked_for, followed, left_out, relieved, tellings, undone
 from quarterdeck.mission.served import served_tasks
 from quarterdeck.mission.told import as_told
 from quarterdeck.mission.triage.plan import METHOD, run_plan
 from quarterdeck.physics.faults import in_fast_world, read_faults
 from quarterdeck.physics.mapping import agreement
 from quarterdeck.physics.measure import measure
+from quarterdeck.physics.moments import Moment, moments
 from quarterdeck.physics.report import Report, check_limits
 from quarterdeck.physics.running import DECIDE, Running
 from quarterdeck.physics.sensing import Sensing
@@ -45,6 +46,8 @@ class Run:
     site: Site | None = None  # what was there in the end, and what was to be covered by then
     map: Occupancy | None = None  # what robots that drew a map made of it
     told: Mission | None = None  # the plan as its vehicles were told it, of the site and the tasks asked for in the end
+    followed: Mission | None = None  # the last plan that was made in the run
+    moments: tuple[Moment, ...] = ()  # who was lost or told a new route, where and when
 
 
 def simulate(
@@ -197,7 +200,10 @@ def simulate(
     if sensing.mapping and run.router is not None:
         made = replace(run.router.findings.shared.occupancy(), place=(mission.frame.lon, mission.frame.lat))
         report = replace(report, figures={**report.figures, **agreement(made, mission.site)})
-    return Run(trace, report, compared, left, made, told)
+    anew = [(t.time, t.route.vehicle) for t in tellings(run.memory)]
+    anew += [(e.time, e.who) for e in compared.driven.log if e.what == "takes over"] if compared else []
+    happened = moments(trace, run.gone, run.lost, anew)
+    return Run(trace, report, compared, left, made, told, followed(run.memory), happened)
 
 
 def _turns(site: Site, changes: Sequence[tuple[float, Changes]]) -> list[tuple[float, list[Obstacle], list[Obstacle]]]:

@@ -188,7 +188,8 @@ def command(
         there = replace(plan, site=run.site or plan.site)
         known = {o.id for o in plan.site.obstacles}
         strange = () if options["world"] else tuple(o for o in there.site.obstacles if o.id not in known)
-        emit(draw(there, run.trace, run.report, strange=strange), picture, force=force)
+        seen = draw(there, run.trace, run.report, strange=strange, moments=run.moments, followed=run.followed)
+        emit(seen, picture, force=force)
     if run.triage is not None:
         from quarterdeck.exporters.casualties import casualties_geojson
         from quarterdeck.exporters.triage_picture import snapshots_png

@@ -6,12 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from shapely import LineString, box
+from shapely import LineString, Point, box
 
-from quarterdeck.exporters.map_panel import legend
 from quarterdeck.exporters.picture import picture
 from quarterdeck.geo.frame import Frame
+from quarterdeck.geo.scenario import Area, Casualty, Obstacle
 from quarterdeck.mission.mission import Layer, undone_layer
+from quarterdeck.physics.moments import Moment
 
 
 def pixels(png):
@@ -32,19 +33,62 @@ def test_every_vehicle_is_seen(make_fleet, frame):
     assert all(near(image, colour) > 100 for colour in ("#0072b2", "#d55e00", "#009e73", "#cc79a7"))
 
 
-def test_a_layer_with_a_colour_of_its_own_is_in_the_legend(make_fleet):
-    """What was surveyed before, and what is undone, are named beside the map; a vehicle's own shapes are not."""
-    figure = Figure()
+def told(png_of, *args, **options):
+    """Return the texts of the legend and of the map that a picture is drawn with."""
+    figures = []
+    original = Figure.savefig
+
+    def keep(figure, *a, **k):
+        figures.append(figure)
+        return original(figure, *a, **k)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "savefig", keep)
+        png_of(*args, **options)
+    chart, panel = figures[0].axes
+    written = [text.get_text() for text in (*chart.texts, *panel.texts)]
+    return {text.get_text() for text in panel.get_legend().get_texts()}, written
+
+
+def test_the_legend_has_what_is_drawn_and_nothing_else(make_fleet):
+    """Layers, regions, casualties and kinds of obstacles that are there are told; what is not there is not."""
     line, area = LineString([(0, 0), (1, 1)]), box(0, 0, 1, 1)
     layers = (
         Layer("surveyed", (line,), ({"stroke": "#999999"},)),
         undone_layer([(area, "no energy left")]),
         Layer("region", (area,), ({"vehicle": "usv1"},)),
+        Layer("line", (line,), ({"vehicle": "usv1"},)),
     )
-    legend(panel := figure.add_subplot(), replace(make_fleet(1), layers=layers))
-    signs = {text.get_text() for text in panel.get_legend().get_texts()}
-    assert {"surveyed", "undone"} <= signs
-    assert "region" not in signs
+    plain = make_fleet(1)
+    common = {"survey", "transit, turn", "operating area", "area", "obstacle", "start"}
+    assert told(picture, plain)[0] == common
+    rich = replace(plain, layers=layers, casualties=(Casualty("c1", (50.0, 50.0), "red"),))
+    assert told(picture, rich)[0] - common == {"surveyed", "undone", "region, by vehicle", "casualty: red (immediate)"}
+    flat = tuple(replace(o, blocks=frozenset({"ground"})) for o in plain.site.obstacles)
+    crossed = replace(plain, site=replace(plain.site, obstacles=flat))
+    assert told(picture, crossed)[0] == common - {"obstacle"} | {"not covered, may be crossed"}
+
+
+def test_areas_of_a_priority_have_their_names_on_the_map(make_fleet):
+    """Of two areas each is named, with its priority."""
+    plain = make_fleet(1)
+    areas = (Area("berth", plain.site.areas[0].polygon, 2), Area("bay", plain.site.areas[0].polygon))
+    signs, written = told(picture, replace(plain, site=replace(plain.site, areas=areas)))
+    assert "area, its name" in signs
+    assert {"berth, priority 2", "bay"} <= set(written)
+
+
+def test_who_is_lost_and_who_takes_over_is_marked(make_fleet):
+    """A loss and a new route have their marks with the time, a line beside the map, and what was kept clear of is drawn."""
+    plan = make_fleet(2)
+    moments = (Moment(300.0, "usv2", "lost", 50.0, 50.0), Moment(3930.0, "usv1", "told", 100.0, 20.0))
+    wreck = Obstacle("wreck of usv2", Point(50.0, 50.0).buffer(5.0))
+    followed = replace(plan, site=replace(plan.site, obstacles=(*plan.site.obstacles, wreck)))
+    signs, written = told(picture, plan, moments=moments, followed=followed)
+    assert {"lost: where and when", "told a new route, when", "wreck or find, kept clear of"} <= signs
+    assert {"usv2 lost 5:00", "1:05:30", "usv2 lost", "usv1 told a new route"} <= set(written)
+    given_up = replace(plan, lost=(replace(plan.vehicles[0], id="usv9"),))
+    assert "usv9 lost" in told(picture, given_up)[1]
 
 
 def test_fifty_vehicles_fit(make_fleet):
