@@ -51,6 +51,7 @@ FORMATS: dict[str, tuple[str, dict[str, Any], str]] = {
     "rtz-1.2": ("rtz", {"version": "1.2"}, "the same, version 1.2"),
 }
 
+NAMED = 8  # failed checks that fit into one line
 SEEN = ("geojson", "html", "png", "qgis", "rerun")  # formats for people; all others something may follow
 
 
@@ -175,13 +176,16 @@ def _check(mission: Mission, names: Iterable[str], settings: Settings, *, unsafe
     if problems and followed and not unsafe:
         short = any(shortfalls(mission.vehicle(route.vehicle), route) for route in mission.routes)
         way = "plan it again, export it with --sorties" if short else "plan it again"
-        raise InputError(f"the plan fails a check: {problems[0]}{_more(problems)}; {way}, or give --unsafe to export it so")
+        raise InputError(
+            f"the plan fails {len(problems)} check{'s'[: len(problems) > 1]}; {way}, or give --unsafe to export it so: "
+            f"{'; '.join(problems[:NAMED])}{_more(problems, NAMED)}"
+        )
     for problem in problems:
         settings.tell(f"the plan fails a check: {problem}")
 
 
-def _more(problems: Sequence[str]) -> str:
-    return f" (and {len(problems) - 1} more: `quarterdeck check` lists them)" if len(problems) > 1 else ""
+def _more(problems: Sequence[str], named: int = 1) -> str:
+    return f" (and {len(problems) - named} more: `quarterdeck check` lists them)" if len(problems) > named else ""
 
 
 def _exporter(name: str) -> Callable[[Mission, Settings], Mapping[str, bytes | str]]:

@@ -110,7 +110,7 @@ def test_a_plan_that_fails_a_check_is_for_eyes_alone(boats, tmp_path):
         "passes 'rock' at 2.00 m": replace(boats, site=replace(boats.site, obstacles=(rock,))),
     }
     for number, (why, mission) in enumerate(cases.items()):
-        with pytest.raises(InputError, match=f"fails a check: .*{why}.*--unsafe"):
+        with pytest.raises(InputError, match=f"fails .* check.*--unsafe.*: .*{why}"):
             export(mission, ["png", "qgc-wpl"], tmp_path / "refused")
         said = []
         export(mission, "geojson", tmp_path / f"drawn-{number}", tell=said.append)
@@ -131,7 +131,7 @@ def test_what_is_too_far_is_told_or_split_into_sorties(boats, tmp_path):
     """Without sorties it is refused, unless unsafe; with them each round has a folder, each file its own home and work."""
     vehicles = tuple(replace(v, endurance=1200.0) for v in boats.vehicles)
     far, said = replace(boats, vehicles=vehicles), []
-    with pytest.raises(InputError, match=r"short by .* --sorties, or give --unsafe"):
+    with pytest.raises(InputError, match=r"--sorties, or give --unsafe to export it so: usv1: .*short by .*; usv2: .*short by "):
         export(far, "qgc-wpl", tmp_path / "whole")
     export(far, "qgc-wpl", tmp_path / "whole", unsafe=True, tell=said.append)
     assert any("fails a check: usv1: needs" in line for line in said)
