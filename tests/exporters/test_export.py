@@ -131,7 +131,7 @@ def test_what_is_too_far_is_told_or_split_into_sorties(boats, tmp_path):
     """Without sorties it is refused, unless unsafe; with them each round has a folder, each file its own home and work."""
     vehicles = tuple(replace(v, endurance=1200.0) for v in boats.vehicles)
     far, said = replace(boats, vehicles=vehicles), []
-    with pytest.raises(InputError, match=r"--sorties, or give --unsafe to export it so: usv1: .*short by .*; usv2: .*short by "):
+    with pytest.raises(InputError, match=r"--sorties, or give --unsafe .*: usv1: .*short by .*; usv2: .*short by "):
         export(far, "qgc-wpl", tmp_path / "whole")
     export(far, "qgc-wpl", tmp_path / "whole", unsafe=True, tell=said.append)
     assert any("fails a check: usv1: needs" in line for line in said)
