@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from quarterdeck.geo.scenario import Vehicle
-from quarterdeck.mission.mission import Waypoint
+from quarterdeck.mission.mission import Mission, Waypoint
 
 LEGS = ("start", "transit", "survey", "turn", "takeoff", "landing")  # a leg's code is its place here
 SAIL, HOLD, IDLE, ROTATE = range(4)  # modes of a track
@@ -79,3 +79,18 @@ def command_track(
         track["leg"] -= 1
     track["integral"] = track["reach"] = track["pace"] = track["aside"] = track["want"] = 0.0
     return np.concatenate([table, rows])
+
+
+def starts(mission: Mission) -> tuple[np.ndarray, np.ndarray]:
+    """Return where the vehicles stand (k, 3) and head (k,): at their routes' first waypoint, towards the second."""
+    routes = {route.vehicle: route.waypoints for route in mission.routes}
+    position, heading = np.zeros((len(mission.vehicles), 3)), np.zeros(len(mission.vehicles))
+    for i, vehicle in enumerate(mission.vehicles):
+        waypoints = routes.get(vehicle.id, ())
+        position[i, :2] = vehicle.start
+        if waypoints:
+            position[i] = waypoints[0].x, waypoints[0].y, waypoints[0].z if vehicle.domain == "aerial" else 0.0
+        onward = next((w for w in waypoints if np.hypot(w.x - position[i, 0], w.y - position[i, 1]) > 0.01), None)
+        if onward is not None:
+            heading[i] = np.arctan2(onward.y - position[i, 1], onward.x - position[i, 0])
+    return position, heading

@@ -9,9 +9,9 @@ import numpy as np
 from quarterdeck.geo.deadline import cause, time_is_up
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.occupancy import Occupancy
-from quarterdeck.geo.scenario import Obstacle, Site
+from quarterdeck.geo.scenario import Site
 from quarterdeck.geo.terrain import Terrain
-from quarterdeck.mission.changes import Changes, changed_site
+from quarterdeck.mission.changes import Changes
 from quarterdeck.mission.director import Director
 from quarterdeck.mission.fast import run_fast
 from quarterdeck.mission.inspection import default_director
@@ -24,12 +24,14 @@ from quarterdeck.physics.faults import in_fast_world, read_faults
 from quarterdeck.physics.mapping import agreement
 from quarterdeck.physics.measure import measure
 from quarterdeck.physics.moments import Moment, moments
+from quarterdeck.physics.obstacles import spans, standing, turns_of
 from quarterdeck.physics.report import Report, check_limits
 from quarterdeck.physics.running import DECIDE, Running
 from quarterdeck.physics.sensing import Sensing
 from quarterdeck.physics.terrain import check_terrain
 from quarterdeck.physics.trace import Trace, TraceBuilder
 from quarterdeck.physics.triage import Compared, compare, of_devices
+from quarterdeck.physics.wind import Wind
 from quarterdeck.physics.world import open_world
 
 TRIAGE = 7200.0  # s that a triage mission may take at the least, before it is cut short
@@ -110,13 +112,11 @@ def simulate(
     known, director = mission.site, director or default_director(mission)
     there = known.obstacles if sensing.world is None else sensing.world
     plan, mission = mission, replace(mission, site=replace(known, obstacles=(*there, *sensing.unmapped)))
-    turns = _turns(mission.site, changes)
+    turns = turns_of(mission.site, changes)
     cut = ""
     with open_world(step) as world:
-        air = np.array([*wind, 0.0])
-        run = Running(
-            mission, director, world, seed, np.array(current), air, gusts, befalling, sensing, known, terrain, turns
-        )
+        air = Wind(np.array([*wind, 0.0]), gusts, len(ids), seed)
+        run = Running(mission, director, world, seed, np.array(current), air, befalling, sensing, known, terrain, turns)
         builder = TraceBuilder(tuple(v.id for v in mission.vehicles))
         every = max(1, round((sample or step) / step))
         run.decide()
@@ -143,7 +143,7 @@ def simulate(
         compared = compare(mission, run.memory, trace, late, aside, run.standing())
         mission = compared.expected
     elif cut:
-        run.trouble.append(cut)
+        run.status.trouble.append(cut)
     settings: dict[str, Any] = {
         "seed": seed,
         "step": step,
@@ -160,32 +160,27 @@ def simulate(
         "unmapped": [o.id for o in sensing.unmapped],
         "world": None if sensing.world is None else [o.id for o in sensing.world],
     }
-    dead = {v for v, gone in zip(ids, (run.lost | run.aground).tolist(), strict=True) if gone}
+    dead = {v for v, alive in zip(ids, run.status.alive.tolist(), strict=True) if not alive}
     reliefs = [relief for v, relief in relieved(run.memory).items() if v in dead]
     heeded = [wish for when, wish in changes if when <= run.time]
     orders = tellings(run.memory)
     told = as_told(asked_for(plan, heeded), orders, reliefs) if heeded or orders or reliefs else plan
-    served, servers = run.served, run.servers
+    served, servers = run.link.served, run.link.servers
     if told is not plan and plan.method == "guards":  # each plan numbers its guards anew
         found = served_tasks(told, trace.tracks())
         served, servers = {task: when for task, (when, _) in found.items()}, {task: who for task, (_, who) in found.items()}
-    during = {o.id: (0.0, when) for when, old, _ in turns for o in old}
-    during |= {o.id: (when, during.get(o.id, (0.0, np.inf))[1]) for when, _, new in turns for o in new}
-    ever = (*mission.site.obstacles, *(o for _, _, new in turns for o in new))
-    standing = tuple(
-        o for o in ever if during.get(o.id, (0.0, np.inf))[1] > run.time and during.get(o.id, (0.0,))[0] <= run.time
-    )
-    left = replace(told.site, obstacles=standing)
+    ever, during = (*mission.site.obstacles, *(o for turn in turns for o in turn.new)), spans(turns)
+    left = replace(told.site, obstacles=standing(ever, during, run.time))
     report = measure(
         mission if compared else replace(told, site=left),
         trace,
         finished=run.finished.tolist(),
-        aground=run.aground.tolist(),
+        aground=run.status.aground.tolist(),
         served=served,
         limits=limits or {},
         settings=settings,
-        lost=run.lost.tolist(),
-        trouble=[*run.trouble, *(compared.driven.reasons if compared else ())],
+        lost=run.status.lost.tolist(),
+        trouble=[*run.status.trouble, *(compared.driven.reasons if compared else ())],
         localisation=run.senses.report() if run.senses else None,
         triage=compared.document() if compared else None,
         servers=servers,
@@ -202,19 +197,8 @@ def simulate(
         report = replace(report, figures={**report.figures, **agreement(made, mission.site)})
     anew = [(t.time, t.route.vehicle) for t in tellings(run.memory)]
     anew += [(e.time, e.who) for e in compared.driven.log if e.what == "takes over"] if compared else []
-    happened = moments(trace, run.gone, run.lost, anew)
+    happened = moments(trace, run.status.gone, run.status.lost, anew)
     return Run(trace, report, compared, left, made, told, followed(run.memory), happened)
-
-
-def _turns(site: Site, changes: Sequence[tuple[float, Changes]]) -> list[tuple[float, list[Obstacle], list[Obstacle]]]:
-    """Return when what obstacles go, and which appear."""
-    turns = []
-    for when, change in sorted(changes, key=lambda c: c[0]):
-        after = changed_site(site, change)
-        old, new = ({o.id: o for o in s.obstacles} for s in (site, after))
-        turns.append((when, [o for i, o in old.items() if i not in new], [o for i, o in new.items() if i not in old]))
-        site = after
-    return [turn for turn in turns if turn[1] or turn[2]]
 
 
 def _check(

@@ -5,6 +5,22 @@ import numpy as np
 MEMORY = 5  # columns of a gust's memory: along, across (2), up (2)
 
 
+class Wind:
+    """The wind at each of `count` vehicles: its `mean` (3,) m/s, and gusts of standard `deviation` m/s drawn by `seed`."""
+
+    def __init__(self, mean: np.ndarray, deviation: float, count: int, seed: int) -> None:
+        self.mean, self.deviation = mean, deviation
+        self.random, self.memory = np.random.default_rng(seed), np.zeros((count, MEMORY))
+
+    def step(self, step: float, velocity: np.ndarray, height: np.ndarray) -> np.ndarray:
+        """Return the (k, 3) m/s of the next `step` seconds; `velocity` (k, 3) m/s over ground, `height` (k,) m above it."""
+        if self.deviation == 0:
+            return np.broadcast_to(self.mean, velocity.shape)
+        airspeed = np.linalg.norm(velocity - self.mean, axis=1)
+        noise = self.random.standard_normal(velocity.shape)
+        return self.mean + step_gusts(self.memory, noise, airspeed, height, self.deviation, step)
+
+
 def step_gusts(
     memory: np.ndarray, noise: np.ndarray, airspeed: np.ndarray, height: np.ndarray, deviation: float, step: float
 ) -> np.ndarray:
