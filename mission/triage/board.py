@@ -27,9 +27,14 @@ def compare_boards(desk: Desk, one: str, other: str) -> None:
             write_own(desk, name)
     a, b = desk.agents[one].board, desk.agents[other].board
     if a is not b:
-        both = {s: max(a[s], b[s], key=lambda entry: (entry.time, entry.rest < 0)) for s in a}
+        both = {s: x if x is (y := b[s]) or _word(x) >= _word(y) else y for s, x in a.items()}
         for name in (one, other):
             desk.change(name, board=both)
+
+
+def _word(entry: Section) -> tuple[float, bool]:
+    """Return what the younger word, or of one moment the last of a section, has more of."""
+    return entry.time, entry.rest < 0
 
 
 def compare_in_range(desk: Desk, name: str) -> None:

@@ -12,7 +12,7 @@ from quarterdeck.mission.director import Command, State
 from quarterdeck.mission.mission import Waypoint
 from quarterdeck.mission.triage.chase import LEGS, Ways, expanding_square, straight
 from quarterdeck.mission.triage.machines import Row, step
-from quarterdeck.mission.triage.records import XY, Entry, Medic, Memory, Record, Uav, Ugv
+from quarterdeck.mission.triage.records import XY, Entry, Medic, Memory, Record, Section, Uav, Ugv
 from quarterdeck.mission.triage.settings import Policy, Settings
 from quarterdeck.mission.triage.team import Robot, Team
 
@@ -21,13 +21,17 @@ _KIND: dict[type, str] = {Ugv: "ugv", Uav: "uav", Medic: "medic"}
 
 
 class Desk:
-    """One call of the director: `agents` are the records as they stand, `replanned` the medics with a new plan."""
+    """One call of the director: `agents` are the records as they stand, `replanned` the medics with a new plan.
+
+    `looked` is what each UGV that is done knew of the sections when it last looked, in this call, if it is needed.
+    """
 
     __slots__ = (
         "agents",
         "commands",
         "log",
         "look",
+        "looked",
         "mute",
         "out",
         "policy",
@@ -50,6 +54,7 @@ class Desk:
     ) -> None:
         self.team, self.policy, self.settings, self.time, self.states = team, policy, settings, time, states
         self.agents: dict[str, Any] = dict(memory.agents) if memory else {}
+        self.looked: dict[str, Mapping[str, Section]] = {}
         self.out, self.tags = (memory.out, memory.tags) if memory else (frozenset(), frozenset())
         self.mute = memory.mute if memory else frozenset()
         self.log: list[Entry] = list(memory.log) if memory else []

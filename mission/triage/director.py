@@ -120,14 +120,20 @@ def _notice(desk: Desk, event: Event) -> None:
 
 
 def _compare(desk: Desk, a: str, b: str) -> None:
-    """Let two in range compare boards; a UGV that is done may learn that it is needed, or that nobody is missing."""
+    """Let two in range compare boards; a UGV that is done may learn that it is needed, or that nobody is missing.
+
+    It looks once at what it knows: in a crowd of k each would else look at the same k squared times in a call.
+    """
     called = any(desk.agents[name].state == "call" for name in (a, b))
     before = {name: desk.agents[name].board for name in (a, b)}
     compare_boards(desk, a, b)
     for name, board in before.items():
         it = desk.agents[name]
-        if isinstance(it, Ugv) and it.state == "done" and (called or it.board is not board):
+        if not isinstance(it, Ugv) or it.state != "done":
+            continue
+        if called or (it.board is not board and it.board != desk.looked.get(name)):
             ugv.stand_by(desk, name)
+            desk.looked[name] = desk.agents[name].board
 
 
 def _talk(desk: Desk, met: set[tuple[str, str]]) -> None:

@@ -13,6 +13,7 @@ from scipy.spatial import KDTree
 
 from quarterdeck.geo.scenario import Casualty, Scenario
 from quarterdeck.mission.priority_tsp import priority_order
+from quarterdeck.mission.triage import board, director
 from quarterdeck.mission.triage import outcome as outcome_module
 from quarterdeck.mission.triage.director import triage
 from quarterdeck.mission.triage.generate import generate, paper_team
@@ -235,3 +236,25 @@ def test_each_machine_is_connected_and_deterministic(kind: str) -> None:
     drawn = as_markdown(kind)
     assert drawn.count("-->") == sum(not r.extra for r in rows) + 1
     assert drawn in (Path(__file__).parents[3] / "docs" / "triage-machines.md").read_text(encoding="utf-8"), "run make docs"
+
+
+def test_a_crowd_compares_no_more_than_it_has_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of k UGVs in range of each other every pair compares, and each that is done with all: k squared, not its square."""
+    counts: list[int] = []
+    own_compare, own_direct = board.compare_boards, director._answer
+
+    def counted(*arguments: Any) -> None:
+        counts[-1] += 1
+        own_compare(*arguments)
+
+    def begun(*arguments: Any) -> Any:
+        counts.append(0)
+        return own_direct(*arguments)
+
+    monkeypatch.setattr(board, "compare_boards", counted)
+    monkeypatch.setattr(director, "compare_boards", counted)
+    monkeypatch.setattr(director, "_answer", begun)
+    k = 12
+    crowd = generate(paper_team(ugvs=k, size=(30.0, 20.0)), 1, casualties=(2, 2))
+    assert not run_triage(crowd, "relay", Settings(talk=60.0)).reasons
+    assert max(counts) <= 3 * (k + 2) ** 2
