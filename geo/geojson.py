@@ -75,6 +75,8 @@ def parse(data: bytes) -> dict[str, Any]:
 
 def parse_json(data: bytes) -> Any:
     """Return the JSON in `data`. Raises InputError if it is none (RFC 8259: no NaN), or has text that no file can hold."""
+    if not data.strip():
+        raise InputError("is empty")
     try:
         document = json.loads(data.decode("utf-8-sig"), parse_constant=_refuse_constant)
     except UnicodeDecodeError:

@@ -239,7 +239,8 @@ def _reasons(
         over(
             "coverage_loss",
             loss,
-            f"coverage {figures['coverage_driven']:.2%} driven of {figures['coverage_planned']:.2%} planned",
+            f"coverage {figures['coverage_driven']:.2%} driven of {figures['coverage_planned']:.2%} planned; "
+            f"{allowed['coverage_loss']:.2%} of the area may be lost (--limit coverage_loss=...)",
         )
     touched = [v.id for v in vehicles if v.touched or v.hits]
     over("collisions", len(touched), f"collision: {_list(touched)}")
