@@ -1,51 +1,43 @@
-"""Pictures of a triage mission: the timeline that a commander reads, and the field with everybody's way."""
+"""Pictures of a triage mission's field: everybody's way and the casualties, at the end or at telling moments."""
 
 import io
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
+from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
 from shapely import get_parts, get_rings
 
 from quarterdeck.exporters.casualties import MEANING
 from quarterdeck.exporters.map_furniture import fill
-from quarterdeck.geo.palette import CASUALTY
-from quarterdeck.mission.triage.figures import counts_over_time
+from quarterdeck.exporters.map_site import OBSTACLE
+from quarterdeck.geo.palette import CASUALTY, SITE, colours_of
 from quarterdeck.mission.triage.outcome import Outcome
-from quarterdeck.mission.triage.settings import COLOURS, SORT
+from quarterdeck.mission.triage.settings import COLOURS
 from quarterdeck.mission.triage.sight import seen_by, track_at
 
-_STAGES = (
-    ("found", "delivered", "#cfcfcf", "found, no medic told"),
-    ("delivered", "reached", "#8f8f8f", "waiting for the medic"),
-)
-_UGVS = ("#1f77b4", "#17becf", "#8c564b", "#e377c2", "#3f007d", "#525252")  # none that a casualty has
-_MEDIC, _UAV = "#ff7f0e", "#9467bd"
-
-
-def timeline_png(outcome: Outcome, *, dpi: int = 150) -> bytes:
-    """Return a PNG: casualties found and treated over time by colour, and below a bar for each from found to treated."""
-    n = max(len(outcome.fates), 1)
-    figure = Figure(figsize=(10, 4.6 + 0.2 * n), layout="constrained")
-    counts, bars = figure.subplots(2, 1, sharex=True, height_ratios=[3.2, 0.6 + 0.2 * n])
-    _draw_counts(counts, outcome)
-    _draw_bars(bars, outcome)
-    return png(figure, dpi=dpi)
+_KINDS = {"ugv": ("s", 1.0, "-"), "uav": ("^", 0.8, ":"), "medic": ("P", 1.8, "-")}  # marker, points of the way, its style
+_STATES = {"face": "#9ecae1", "ring": "#222222"}  # of the legend's casualties: a colour that none has
+_SEARCHED, HALO = "#dfe8f2", [withStroke(linewidth=2.5, foreground="white")]
+_LOST: dict[str, Any] = {"marker": "8", "markeredgecolor": "black", "markeredgewidth": 1.4, "linestyle": "none"}
 
 
 def map_png(outcome: Outcome, *, dpi: int = 150) -> bytes:
-    """Return a PNG of the field with everybody's way to the end."""
-    figure = Figure(figsize=(10, 6.5), layout="constrained")
+    """Return a PNG of the field with everybody's way to the end; casualties have the names that the timeline has."""
+    west, south, east, north = outcome.scenario.site.area.bounds
+    figure = Figure(figsize=(10, min(max(7.6 * (north - south) / (east - west), 3.6), 11.0) + 0.9), layout="compressed")
     ax = figure.subplots()
-    draw_field(ax, outcome)
-    ax.set_xlabel("metres east")
-    ax.set_ylabel("metres north")
-    figure.legend(handles=field_legend(outcome), fontsize=8, loc="outside right center")
+    draw_field(ax, outcome, names=True)
+    done = sum(fate.treated is not None for fate in outcome.fates)
+    words = f"{outcome.scenario.name}, {outcome.method}: {done} of {len(outcome.fates)} treated in {outcome.end:.0f} s"
+    ax.set_title(words, fontsize=10, loc="left", parse_math=False)
+    figure.legend(handles=field_legend(outcome, [outcome.end]), fontsize=8, loc="outside right center")
     return png(figure, dpi=dpi)
 
 
@@ -57,14 +49,15 @@ def snapshots_png(outcome: Outcome, moments: Sequence[tuple[float, str]] | None 
     chosen = list(moments or telling_moments(outcome))
     columns = 2 if len(chosen) <= 4 else 3
     rows = -(-len(chosen) // columns)
-    figure = Figure(figsize=(6.0 * columns, 4.1 * rows), layout="constrained")
-    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    figure = Figure(figsize=(6.0 * columns, 4.1 * rows), layout="compressed")
+    axes = figure.subplots(rows, columns, squeeze=False, gridspec_kw={"hspace": 0.07}).ravel()
     for ax, (time, words) in zip(axes, chosen, strict=False):
         draw_field(ax, outcome, until=time, searched=True)
         ax.set_title(f"t = {time:.0f} s: {words}", fontsize=9, loc="left", parse_math=False)
     for ax in axes[len(chosen) :]:
         ax.set_axis_off()
-    figure.legend(handles=field_legend(outcome), fontsize=8, loc="outside lower center", ncols=10)
+    signs = field_legend(outcome, [time for time, _ in chosen], searched=True)
+    figure.legend(handles=signs, fontsize=8, loc="outside lower center", ncols=4 * columns)
     return png(figure, dpi=dpi)
 
 
@@ -114,7 +107,8 @@ def png(figure: Figure, *, dpi: int = 150) -> bytes:
     """Return a figure's PNG bytes, the same for the same figure."""
     stream = io.BytesIO()
     with mpl.rc_context({"savefig.facecolor": "white"}):
-        figure.savefig(stream, format="png", dpi=dpi, metadata={"Software": None})
+        # The layout does not see all that stands beside an axes of a given aspect; tight, nothing is cut.
+        figure.savefig(stream, format="png", dpi=dpi, bbox_inches="tight", metadata={"Software": None})
     return stream.getvalue()
 
 
@@ -125,112 +119,94 @@ def draw_field(
     until: float | None = None,
     ways: tuple[str, ...] = ("ugv", "uav", "medic"),
     searched: bool = False,
+    names: bool = False,
 ) -> None:
     """Draw the field, obstacles, casualties and ways up to `until` seconds (None: to the end) on an axes, in metres.
 
-    `ways` says whose ways are drawn; `searched` shades what UGVs have passed within their range. A casualty not found yet
-    is hollow, one found and not told to a medic has no rim, a treated one is crossed out.
+    `ways` says whose ways are drawn; `searched` shades what UGVs have passed within their range; `names` writes the
+    casualties' names. One not found yet is hollow, one that a medic knows of has a ring, a treated one is crossed out.
     """
     until = max(float(t[-1, 0]) for t in outcome.run.tracks.values()) if until is None else until
     site, team = outcome.scenario.site, outcome.team
-    shapes = [(site.area, "none", "#555555"), *((o.polygon, "#c9b8a8", "#6b5a4a") for o in site.obstacles)]
     if searched:
         seen = seen_by(team, outcome.run.tracks, until).intersection(site.area)
-        fill(ax, seen, facecolor="#dfe8f2", edgecolor="none", zorder=0)
-    for polygons, face, edge in shapes:
-        for ring in get_rings(get_parts(polygons)):
-            ax.fill(*np.array(ring.coords).T, lw=0.8, fc=face, ec=edge)
-    looks = {u: (_UGVS[i % len(_UGVS)], "s", "ugv") for i, u in enumerate(team.ugvs)}
-    looks |= dict.fromkeys(team.uavs, (_UAV, "^", "uav")) | dict.fromkeys(team.medics, (_MEDIC, "P", "medic"))
-    for name, (colour, marker, kind) in looks.items():
+        fill(ax, seen, facecolor=_SEARCHED, edgecolor="none", zorder=0)
+    for ring in get_rings(get_parts(site.area)):
+        ax.plot(*np.array(ring.coords).T, lw=0.8, color=SITE["area"])
+    for obstacle in site.obstacles:
+        fill(ax, obstacle.polygon, facecolor=OBSTACLE, edgecolor=SITE["obstacle"], linewidth=0.8, zorder=1.5)
+    lost = {who: time for time, who in losses(outcome) if time <= until}
+    for name, (colour, kind) in looks(outcome).items():
+        marker, wide, style = _KINDS[kind]
         track = outcome.run.tracks[name]
         here = track_at(track, np.array([until]))[0]
         if kind in ways:
             path = np.vstack([track[track[:, 0] <= until, 1:], here])
-            wide = {"ugv": 1.0, "uav": 0.7, "medic": 1.8}[kind]
-            ax.plot(*path.T, color=colour, lw=wide, ls=":" if kind == "uav" else "-", alpha=0.8 if kind != "uav" else 0.6)
-        ax.plot(*here, marker=marker, color=colour, ms=7, mec="black", mew=0.6, zorder=5)
+            ax.plot(*path.T, color=colour, lw=wide, ls=style, alpha=0.85)
+        look: dict[str, Any] = _LOST | {"markersize": 10} if name in lost else {"marker": marker, "ms": 7, "mec": "black"}
+        ax.plot(*here, color=colour, zorder=5, **look)
+        if name in lost:
+            _name(ax, here, f"{name} lost at {lost[name]:.0f} s")
     for fate in outcome.fates:
+        found, told, treated = (t is not None and t <= until for t in (fate.found, fate.delivered, fate.treated))
         colour = CASUALTY[fate.colour]
-        seen, told = (t is not None and t <= until for t in (fate.found, fate.delivered))
-        ax.plot(
-            fate.x,
-            fate.y,
-            "*",
-            ms=12,
-            mfc=colour if seen else "white",
-            mec="black" if told else colour,
-            mew=0.9,
-            zorder=4,
-        )
-        if fate.treated is not None and fate.treated <= until:
-            ax.plot(fate.x, fate.y, "x", ms=5, color="black", mew=1.3, zorder=6)
+        ax.plot(fate.x, fate.y, "*", ms=14, mfc=colour if found else "white", mec="#222222" if found else colour, mew=0.7,
+                zorder=4)  # fmt: skip
+        if told:
+            ax.plot(fate.x, fate.y, "o", ms=17, mfc="none", mec=_STATES["ring"], mew=1.1, zorder=4)
+        if treated:
+            ax.plot(fate.x, fate.y, "x", ms=5, color="white" if fate.colour == "black" else "black", mew=1.3, zorder=6)
+        if names:
+            _name(ax, np.array([fate.x, fate.y]), fate.id)
     ax.set_aspect("equal")
     ax.margins(0.03)
     ax.tick_params(labelsize=7)
+    ax.set_xlabel("metres east", fontsize=8)
+    ax.set_ylabel("metres north", fontsize=8)
 
 
-def field_legend(outcome: Outcome) -> list[Line2D]:
-    """Return the legend's handles of `draw_field`."""
+def _name(ax: Axes, place: np.ndarray, words: str) -> None:
+    ax.annotate(words, (place[0], place[1]), xytext=(7, 5), textcoords="offset points", fontsize=7, zorder=7,
+                path_effects=HALO, parse_math=False)  # fmt: skip
 
-    def mark(label: str, marker: str, **style: object) -> Line2D:
-        return Line2D([], [], ls="none", marker=marker, label=label, **style)  # type: ignore[arg-type]
 
-    handles = [mark(u, "s", color=_UGVS[i % len(_UGVS)]) for i, u in enumerate(outcome.team.ugvs)]
-    handles += [mark("UAV", "^", color=_UAV)] if outcome.team.uavs else []
-    handles += [mark("medic", "P", color=_MEDIC), mark("not found yet", "*", ms=10, mfc="white", mec="black")]
+def looks(outcome: Outcome) -> dict[str, tuple[str, str]]:
+    """Return each member's colour, as all files and pictures have it, and kind."""
+    team = outcome.team
+    kinds = dict.fromkeys(team.ugvs, "ugv") | dict.fromkeys(team.uavs, "uav") | dict.fromkeys(team.medics, "medic")
+    palette = colours_of([*kinds, *(v.id for v in outcome.scenario.vehicles)], casualties=True)
+    return {name: (palette[name], kind) for name, kind in kinds.items()}
+
+
+def losses(outcome: Outcome) -> list[tuple[float, str]]:
+    """Return when who stopped for ever."""
+    return [(e.time, e.who) for e in outcome.log if e.what == "lost" and e.about == "stop"]
+
+
+def field_legend(outcome: Outcome, moments: Sequence[float], *, searched: bool = False) -> list[Line2D | Patch]:
+    """Return the legend's signs of what `draw_field` draws at these moments."""
+
+    def mark(label: str, **style: Any) -> Line2D:
+        return Line2D([], [], ls="none", label=label, **style)
+
+    handles: list[Line2D | Patch] = []
+    for name, (colour, kind) in looks(outcome).items():
+        handles.append(mark(name, marker=_KINDS[kind][0], color=colour, mec="black"))
+    if any(time <= max(moments) for time, _ in losses(outcome)):
+        handles.append(Line2D([], [], **_LOST, color="white", markersize=9, label="lost"))
     handles += [
-        mark("found", "*", ms=10, color="#d62728", mew=0),
-        mark("a medic knows", "*", ms=10, mfc="#d62728", mec="black"),
+        mark(f"{colour} ({MEANING[colour]})", marker="*", ms=11, color=CASUALTY[colour], mec="#222222")
+        for colour in COLOURS
+        if any(fate.colour == colour for fate in outcome.fates)
     ]
-    handles += [mark("treated", "x", color="black")]
-    return handles
-
-
-def _draw_counts(ax: Axes, outcome: Outcome) -> None:
-    times = np.linspace(0.0, outcome.end, 1000)
-    for colour, counts in counts_over_time(outcome.fates, times).items():
-        ax.step(times, counts["found"], where="post", color=CASUALTY[colour], lw=1.2, ls="--")
-        ax.step(times, counts["treated"], where="post", color=CASUALTY[colour], lw=2.2)
-    present = [c for c in COLOURS if any(f.colour == c for f in outcome.fates)]
-    handles = [Line2D([], [], color=CASUALTY[c], lw=2.2, label=f"{c} ({MEANING[c]})") for c in present]
-    handles += [Line2D([], [], color="black", lw=1.2, ls="--", label="found")]
-    handles += [Line2D([], [], color="black", lw=2.2, label="treated")]
-    ax.legend(handles=handles, fontsize=8, ncols=2, loc="upper left")
-    ax.set_ylabel("casualties")
-    ax.yaxis.set_major_locator(MaxNLocator(integer=True))
-    ax.grid(alpha=0.3)
-    done = sum(f.treated is not None for f in outcome.fates)
-    ax.set_title(
-        f"{outcome.scenario.name}, {outcome.method}: {done} of {len(outcome.fates)} treated in {outcome.end:.0f} s",
-        loc="left",
-        fontsize=10,
-    )
-
-
-def _draw_bars(ax: Axes, outcome: Outcome) -> None:
-    order = sorted(
-        outcome.fates, key=lambda f: (list(SORT).index(f.colour), f.found is None, f.found if f.found is not None else 0.0)
-    )
-    for row, fate in enumerate(order):
-        for begin, end, grey, _ in _STAGES:
-            start = getattr(fate, begin)
-            if start is not None:
-                stop = getattr(fate, end)
-                ax.barh(row, (outcome.end if stop is None else stop) - start, left=start, color=grey, height=0.62)
-                if stop is None:
-                    break
-        if fate.reached is not None and fate.treated is not None:
-            ax.barh(row, fate.treated - fate.reached, left=fate.reached, color=CASUALTY[fate.colour], height=0.62)
-        elif fate.state != "treated":
-            ax.text(outcome.end, row, f" {fate.state}", va="center", fontsize=7)
-    ax.set_yticks(range(len(order)), [f.id for f in order], fontsize=7)
-    for label, fate in zip(ax.get_yticklabels(), order, strict=True):
-        label.set_color(CASUALTY[fate.colour])
-    ax.set_ylim(len(order) - 0.4, -0.6)
-    ax.set_xlim(0.0, max(outcome.end, 1.0))
-    ax.set_xlabel("seconds from the mission's start")
-    stages = (*((c, t) for _, _, c, t in _STAGES), (CASUALTY["red"], "in treatment"))
-    handles = [Line2D([], [], color=c, lw=6, label=t) for c, t in stages]
-    ax.figure.legend(handles=handles, fontsize=8, loc="outside lower right", ncols=3)
-    ax.grid(axis="x", alpha=0.3)
+    stages = {
+        "not found yet": ("found", False, {"marker": "*", "ms": 11, "mfc": "white", "mec": "#222222"}),
+        "found": ("found", True, {"marker": "*", "ms": 11, "mfc": _STATES["face"], "mec": "#222222"}),
+        "a medic knows": ("delivered", True, {"marker": "o", "ms": 11, "mfc": "none", "mec": _STATES["ring"]}),
+        "treated": ("treated", True, {"marker": "x", "color": "black", "mew": 1.4}),
+    }
+    for label, (what, there, style) in stages.items():
+        if any(((when := getattr(f, what)) is not None and when <= t) == there for f in outcome.fates for t in moments):
+            handles.append(mark(label, **style))
+    handles += [Patch(facecolor=_SEARCHED, label="searched")] if searched else []
+    return handles + ([Patch(facecolor=OBSTACLE, label="obstacle")] if outcome.scenario.site.obstacles else [])

@@ -177,15 +177,15 @@ def command(
         run = replace(run, report=with_state(mission, run, run.trace.tracks()))
     if report:
         emit(run.report.to_json(), report, force=force)
+    plan = run.told or mission
+    there = replace(plan, site=run.site or plan.site)
     if rrd:
         from quarterdeck.exporters.recording import recording
 
-        emit(recording(mission, run.trace), rrd, force=force)
+        emit(recording(there, run.trace, moments=run.moments), rrd, force=force)
     if picture:
         from quarterdeck.exporters.picture import picture as draw
 
-        plan = run.told or mission
-        there = replace(plan, site=run.site or plan.site)
         known = {o.id for o in plan.site.obstacles}
         strange = () if options["world"] else tuple(o for o in there.site.obstacles if o.id not in known)
         seen = draw(there, run.trace, run.report, strange=strange, moments=run.moments, followed=run.followed)

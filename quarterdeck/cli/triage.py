@@ -231,7 +231,7 @@ def _settings(options: dict[str, Any]) -> Settings:
 
 
 def _timeline(outcome: Outcome) -> bytes:
-    from quarterdeck.exporters.triage_picture import timeline_png
+    from quarterdeck.exporters.triage_timeline import timeline_png
 
     return timeline_png(outcome)
 
