@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 
+from quarterdeck.geo.errors import OutOfTimeError
+
 
 @dataclass
 class Limit:
@@ -25,6 +27,7 @@ class Limit:
 
 
 _LIMIT: ContextVar[Limit | None] = ContextVar("limit", default=None)
+_ADVICE: ContextVar[str] = ContextVar("advice", default="")  # to whom nothing can be given in time
 
 
 @contextmanager
@@ -65,6 +68,25 @@ def time_is_up(what: str) -> bool:
     if what not in limit.cut:
         limit.cut.append(what)
     return True
+
+
+@contextmanager
+def abandoning(advice: str) -> Iterator[None]:
+    """Have work within that has no result before its end be abandoned at the limit, by `go_on`; elsewhere it is finished.
+
+    `advice` says what to do then.
+    """
+    token = _ADVICE.set(advice)
+    try:
+        yield
+    finally:
+        _ADVICE.reset(token)
+
+
+def go_on(what: str) -> None:
+    """Return if there is time for `what`, in the user's words. At the limit raises OutOfTimeError within `abandoning`."""
+    if _ADVICE.get() and time_is_up(what):
+        raise OutOfTimeError(f"{cause()}: it ended {what}, before there was a result; {_ADVICE.get()}")
 
 
 def time_left() -> float | None:

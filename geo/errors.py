@@ -13,6 +13,10 @@ class UnavailableError(QuarterdeckError, RuntimeError):
     """Something that this machine lacks is needed, such as PyBullet. The text says how to get it; exit status 2."""
 
 
+class OutOfTimeError(QuarterdeckError, TimeoutError):
+    """The time limit, or Ctrl-C, came before there was any result. The text says what was not done and what to do."""
+
+
 def one_line(text: str) -> str:
     """Return a message as one line of at most 1000 characters, without what steers a terminal: names are from files."""
     line = "".join(c if c.isprintable() else "\ufffd" for c in " ".join(text.split()))

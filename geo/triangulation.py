@@ -25,7 +25,7 @@ class TriangulationError(QuarterdeckError, ValueError):
     """A triangulation would be wrong: a point is outside, or a backend lost a vertex or an area."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)  # one is itself alone, and can be a key
 class Triangulation:
     """A constrained Delaunay triangulation.
 

@@ -4,6 +4,8 @@ From the point's triangle the view passes from triangle to triangle through thei
 wall or the range stops it. What is visited is what is seen, whatever the size of the map.
 """
 
+from functools import lru_cache
+
 import numpy as np
 import shapely
 from numba import njit
@@ -25,7 +27,7 @@ def visibility_polygons(
     points = np.ascontiguousarray(points, dtype=float).reshape(-1, 2)
     ranges = np.full(len(points), ranges, dtype=float)
     reach = ranges / np.cos(np.pi / DISC_SIDES) if outer else ranges
-    coordinates, sizes = _outlines(mesh.vertices, mesh.triangles, mesh.neighbours, points, reach)
+    coordinates, sizes = _outlines(mesh.vertices, mesh.triangles, mesh.neighbours, *_homes(mesh, points), points, reach)
     index = np.repeat(np.arange(len(points)), sizes)
     stars = np.full(len(points), shapely.Polygon(), dtype=object)
     some = np.flatnonzero(sizes >= 4)
@@ -50,10 +52,12 @@ def visible_points(
     origins = np.ascontiguousarray(origins, dtype=float).reshape(-1, 2)
     points = np.ascontiguousarray(points, dtype=float).reshape(-1, 2)
     ranges = np.full(len(origins), ranges, dtype=float)
-    home = _locate_all(mesh.vertices, mesh.triangles, points)
+    starts, homes = _homes(mesh, points)
+    home = np.append(homes, -1)[np.where(np.diff(starts) > 0, starts[:-1], len(homes))]
     order = np.argsort(home, kind="stable")
     first = np.searchsorted(home[order], np.arange(len(mesh.triangles) + 1))
-    return _visible(mesh.vertices, mesh.triangles, mesh.neighbours, origins, ranges, points, order, first)
+    arrays = (mesh.vertices, mesh.triangles, mesh.neighbours, *_homes(mesh, origins))
+    return _visible(*arrays, origins, ranges, points, order, first)
 
 
 def visible_vertices(mesh: Triangulation, origins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -62,7 +66,25 @@ def visible_vertices(mesh: Triangulation, origins: np.ndarray) -> tuple[np.ndarr
     What is behind another vertex, in line with it, counts as seen unless a wall lies between.
     """
     origins = np.ascontiguousarray(origins, dtype=float).reshape(-1, 2)
-    return _visible_vertices(mesh.vertices, mesh.triangles, mesh.neighbours, origins)
+    return _visible_vertices(mesh.vertices, mesh.triangles, mesh.neighbours, *_homes(mesh, origins), origins)
+
+
+def _homes(mesh: Triangulation, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the triangles that hold each of (k, 2) points, several where it is on an edge: CSR (k + 1,) and ascending."""
+    point, triangle = _tree(mesh).query(shapely.points(points))
+    order = np.lexsort((triangle, point))
+    point, triangle = point[order], triangle[order]
+    held = _hold(mesh.vertices, mesh.triangles, triangle, points[point])
+    return np.searchsorted(point[held], np.arange(len(points) + 1)), triangle[held]
+
+
+@lru_cache(maxsize=4)
+def _tree(mesh: Triangulation) -> shapely.STRtree:
+    """Return a tree of the triangles' boxes, a little wider than `_holds` widens them."""
+    corners = mesh.vertices[mesh.triangles]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    hair = 4 * ON_EDGE * np.abs(corners).max(axis=(1, 2))[:, None]
+    return shapely.STRtree(shapely.box(*(low - hair).T, *(high + hair).T))
 
 
 def _discs(points: np.ndarray, radii: np.ndarray) -> np.ndarray:
@@ -88,14 +110,11 @@ def _holds(vertices: np.ndarray, triangle: np.ndarray, x: float, y: float) -> bo
 
 
 @njit(cache=True)
-def _locate_all(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
-    home = np.full(len(points), -1, dtype=np.int64)
-    for k in range(len(points)):
-        for t in range(len(triangles)):
-            if _holds(vertices, triangles[t], points[k, 0], points[k, 1]):
-                home[k] = t
-                break
-    return home
+def _hold(vertices: np.ndarray, triangles: np.ndarray, which: np.ndarray, points: np.ndarray) -> np.ndarray:
+    held = np.empty(len(which), dtype=np.bool_)
+    for k in range(len(which)):
+        held[k] = _holds(vertices, triangles[which[k]], points[k, 0], points[k, 1])
+    return held
 
 
 @njit(cache=True)
@@ -110,9 +129,15 @@ def _distance2(ax: float, ay: float, bx: float, by: float, x: float, y: float) -
 
 @njit(cache=True)
 def _expand(
-    vertices: np.ndarray, triangles: np.ndarray, neighbours: np.ndarray, x: float, y: float, reach: float
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    neighbours: np.ndarray,
+    homes: np.ndarray,
+    x: float,
+    y: float,
+    reach: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return what is seen from (x, y), counter-clockwise.
+    """Return what is seen from (x, y), in the triangles `homes`, counter-clockwise.
 
     `cones` (c, 3): a triangle and the vertices right and left between which it is seen (-1, -1: wholly).
     `ends` (e, 4): the edges where the view ends, as vertices: its own right and left, and the cone's right and left;
@@ -125,9 +150,7 @@ def _expand(
         (64, 5), dtype=np.float64
     )  # the first edges: triangle, corner opposite, right, left, angle of the right
     d = 0
-    for t in range(len(triangles)):
-        if not _holds(vertices, triangles[t], x, y):
-            continue
+    for t in homes:
         if c == len(cones):
             cones = np.concatenate((cones, np.empty_like(cones)))
         if d + 3 > len(doors):
@@ -216,7 +239,13 @@ def _hit(vertices: np.ndarray, x: float, y: float, through: int, right: int, lef
 
 @njit(cache=True)
 def _outlines(
-    vertices: np.ndarray, triangles: np.ndarray, neighbours: np.ndarray, points: np.ndarray, reach: np.ndarray
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    neighbours: np.ndarray,
+    home_starts: np.ndarray,
+    homes: np.ndarray,
+    points: np.ndarray,
+    reach: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the closed rings of all points one after the other, and (k,) their sizes."""
     out = np.empty((1024, 2))
@@ -224,7 +253,8 @@ def _outlines(
     n = 0
     for k in range(len(points)):
         x, y = points[k]
-        _, ends = _expand(vertices, triangles, neighbours, x, y, reach[k])
+        home = homes[home_starts[k] : home_starts[k + 1]]
+        _, ends = _expand(vertices, triangles, neighbours, home, x, y, reach[k])
         begin = n
         if not len(ends):
             continue
@@ -263,6 +293,8 @@ def _visible(
     vertices: np.ndarray,
     triangles: np.ndarray,
     neighbours: np.ndarray,
+    home_starts: np.ndarray,
+    homes: np.ndarray,
     origins: np.ndarray,
     ranges: np.ndarray,
     points: np.ndarray,
@@ -276,7 +308,8 @@ def _visible(
     for k in range(len(origins)):
         x, y = origins[k]
         begin = n
-        cones, _ = _expand(vertices, triangles, neighbours, x, y, ranges[k])
+        home = homes[home_starts[k] : home_starts[k + 1]]
+        cones, _ = _expand(vertices, triangles, neighbours, home, x, y, ranges[k])
         for c in range(len(cones)):
             t = cones[c, 0]
             for q in order[first[t] : first[t + 1]]:
@@ -296,7 +329,12 @@ def _visible(
 
 @njit(cache=True)
 def _visible_vertices(
-    vertices: np.ndarray, triangles: np.ndarray, neighbours: np.ndarray, origins: np.ndarray
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    neighbours: np.ndarray,
+    home_starts: np.ndarray,
+    homes: np.ndarray,
+    origins: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     starts = np.zeros(len(origins) + 1, dtype=np.int64)
     found = np.empty(1024, dtype=np.int64)
@@ -305,7 +343,8 @@ def _visible_vertices(
     for k in range(len(origins)):
         x, y = origins[k]
         begin = n
-        cones, _ = _expand(vertices, triangles, neighbours, x, y, np.inf)
+        home = homes[home_starts[k] : home_starts[k + 1]]
+        cones, _ = _expand(vertices, triangles, neighbours, home, x, y, np.inf)
         for c in range(len(cones)):
             for i in range(3):
                 v = triangles[cones[c, 0], i]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import shapely
+from numba import njit
 from shapely import MultiPolygon, Polygon
 
 from quarterdeck.coverage.guards.space import HAIR, Space
@@ -39,22 +40,64 @@ def trapezoids(polygon: Polygon | MultiPolygon) -> list[np.ndarray]:
     """
     west, south, east, north = polygon.bounds
     extent = max(east - west, north - south)
-    corners = np.unique(shapely.get_coordinates(polygon), axis=0)
-    top, bottom = np.full(len(corners), north + extent), np.full(len(corners), south - extent)
-    x = corners[:, 0]
-    verticals = shapely.linestrings(np.stack([np.column_stack([x, bottom]), np.column_stack([x, top])], axis=1))
-    shapely.prepare(polygon)
-    chords, of = shapely.get_parts(shapely.intersection(verticals, polygon), return_index=True)
-    lines = shapely.get_dimensions(chords) == 1
-    touching = shapely.distance(chords, shapely.points(corners[of])) <= 1e-9 * extent
-    ends = shapely.bounds(chords[lines & touching])
-    longer = np.column_stack([ends[:, 0], ends[:, 1] - 1e-9 * extent, ends[:, 2], ends[:, 3] + 1e-9 * extent])
-    cuts = shapely.linestrings(longer.reshape(-1, 2, 2))
+    hair = 1e-9 * extent
+    ends = _verticals(polygon, hair)
+    cuts = shapely.linestrings(ends + np.array([[0.0, -hair], [0.0, hair]]))
     noded = shapely.union_all([polygon.boundary, *cuts], grid_size=2.0 ** np.ceil(np.log2(SNAP * extent)))
     faces = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
     faces = faces[shapely.contains(polygon, shapely.point_on_surface(faces))]
     faces = shapely.orient_polygons(faces)
     return [shapely.get_coordinates(face)[:-1] for face in faces[np.lexsort(shapely.bounds(faces).T)]]
+
+
+def _verticals(polygon: Polygon | MultiPolygon, hair: float) -> np.ndarray:
+    """Return the (n, 2, 2) verticals in a polygon from each corner to the nearest edge below it and above it."""
+    places, ring = shapely.get_coordinates(shapely.get_parts(polygon.boundary), return_index=True)
+    edges = np.hstack([places[:-1], places[1:]])[ring[:-1] == ring[1:]]
+    edges = np.where((edges[:, 0] <= edges[:, 2])[:, None], edges, edges[:, [2, 3, 0, 1]])
+    edges = edges[np.argsort(edges[:, 0], kind="stable")]
+    corners = np.unique(places, axis=0)
+    below, above = _nearest(edges, corners, hair)
+    x, y = np.concatenate([corners, corners]).T
+    other = np.concatenate([below, above])
+    shapely.prepare(polygon)
+    inside = np.isfinite(other)
+    inside[inside] = shapely.contains_xy(polygon, x[inside], (y[inside] + other[inside]) / 2)
+    x, low, high = x[inside], np.minimum(y, other)[inside], np.maximum(y, other)[inside]
+    return np.stack([np.column_stack([x, low]), np.column_stack([x, high])], axis=1)
+
+
+@njit(cache=True)
+def _nearest(edges: np.ndarray, corners: np.ndarray, hair: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return (n,) y of the nearest edge below each of (n, 2) corners, and above it, but for those within `hair`; infinite
+    for none. A line sweeps over corners and edges (m, 4), both by x, past the edges that it crosses.
+    """
+    below, above = np.full(len(corners), -np.inf), np.full(len(corners), np.inf)
+    crossed = np.empty(len(edges), dtype=np.int64)
+    n = ahead = 0
+    for i in range(len(corners)):
+        x, y = corners[i]
+        while ahead < len(edges) and edges[ahead, 0] <= x:
+            crossed[n] = ahead
+            n += 1
+            ahead += 1
+        kept = 0
+        for j in range(n):
+            ax, ay, bx, by = edges[crossed[j]]
+            if bx < x:
+                continue
+            crossed[kept] = crossed[j]
+            kept += 1
+            for end in range(2 if ax == bx else 1):  # an upright edge has both ends here
+                at = (
+                    (by if end else ay) if ax == bx or x == ax else by if x == bx else ay + (x - ax) / (bx - ax) * (by - ay)
+                )
+                if at < y - hair:
+                    below[i] = max(below[i], at)
+                elif at > y + hair:
+                    above[i] = min(above[i], at)
+        n = kept
+    return below, above
 
 
 def _guard(piece: np.ndarray, space: Space, radius: float, everywhere: bool) -> np.ndarray | None:
