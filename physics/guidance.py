@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from quarterdeck.geo.angles import wrap
 from quarterdeck.physics.braking import LOOK
 from quarterdeck.physics.paths import HOLD, IDLE, ROTATE, SAIL
 
@@ -18,6 +19,8 @@ ARRIVED = 1.0  # m: a vessel this near its waypoint has reached it
 CORNER = 0.3  # radians: a ground vehicle stops and turns on the spot at sharper corners
 CUT = 0.3  # m: how far inside a corner a multirotor may pass
 SIDEWAYS = 0.33  # of its speed: how fast one goes aside
+
+_wrap = njit(cache=True)(wrap)
 
 
 @njit(cache=True)
@@ -293,11 +296,6 @@ def _leg(t: Any, table: np.ndarray, x: float, y: float) -> tuple[float, float, f
         return 1.0, 0.0, 0.0, 0.0, 0.0
     tx, ty = dx / length, dy / length
     return tx, ty, length, tx * (x - a.x) + ty * (y - a.y), tx * (y - a.y) - ty * (x - a.x)
-
-
-@njit(cache=True)
-def _wrap(angle: float) -> float:
-    return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
 @njit(cache=True)

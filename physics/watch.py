@@ -10,7 +10,7 @@ from quarterdeck.geo.scenario import Site, Vehicle
 from quarterdeck.physics.braking import SPARE, TOUCH, brake_in_time
 from quarterdeck.physics.fleet import Fleet
 from quarterdeck.physics.paths import HOLD
-from quarterdeck.physics.separation import CREEP, give_way
+from quarterdeck.physics.separation import CREEP, TRAFFIC, give_way
 from quarterdeck.physics.world import HEIGHT
 
 KEEP = 3.0  # lengths kept from other vehicles
@@ -61,55 +61,33 @@ class Watch:
         come as near as it may. `position` (k, 3) metres, `heading` (k,) radians, `velocity` (k, 3) m/s over ground, `rate`
         (k,) rad/s; `present` (k,) are those out there.
         """
-        count = len(position)
-        slow, want, instead = (np.empty(count) for _ in range(3))
-        course, aside, rest = fleet.gather("course"), fleet.gather("shifted"), fleet.gather("rest")
         speed = np.linalg.norm(velocity, axis=1)
         pace = np.where(fleet.gather("idle"), 0.0, fleet.gather("pace"))
         going = present & (fleet.gather("tracks")["mode"] != HOLD) & (pace > 0.0)
         order, stood = self._stand(time, position, going, fleet.gather("tracks")["want"] != 0.0)
-        place = np.argsort(order)
         stands = stood > WAITS
-        start, end = fleet.gather("ends").transpose(1, 0, 2)
-        leg = (end - start) * going[:, None] / np.maximum(np.linalg.norm(end - start, axis=1), 1e-9)[:, None]
-        bow = np.column_stack([np.cos(heading), np.sin(heading)])
-        side = np.where(np.any(course != 0.0, axis=1, keepdims=True), course, bow)[:, ::-1] * [1.0, -1.0]
-        offset = np.sum((position - start)[:, :2] * side, axis=1)
-        to_go = np.linalg.norm(end - position, axis=1)
-        give_way(
-            position, course, leg, side, speed, pace, aside, offset, to_go, self.keep, self.reach, present, place, stands,
-            slow, want, instead,
-        )  # fmt: skip
+        bow = np.column_stack([np.cos(heading), np.sin(heading), np.zeros(len(heading))])
+        traffic = self._traffic(fleet, position, bow, speed, pace, going)
+        traffic["present"], traffic["place"], traffic["stands"] = present, np.argsort(order), stands
+        give_way(traffic)
         # Who was held sets out slowly: the slower, the shorter is its way to rest.
-        slow = np.where(stands & (self.slow <= CREEP * pace), np.minimum(slow, CREEP * pace), slow)
-        for i in map(int, np.flatnonzero(((want != 0) | (aside != 0)) & going)):
-            ahead = course[i] * min(max(speed[i], 0.5 * pace[i]) * AHEAD, rest[i])
-            sides = [w for w in (want[i], instead[i]) if not np.isnan(w)]
-            offsets = (*sides, aside[i], 0.0)
-            found = next((w for w in offsets if self._has_room(i, position[i, :2], ahead, (w - aside[i]) * side[i])), None)
-            want[i] = 0.0 if found is None else found
-            if len(sides) == 2 and want[i] not in sides:  # it can pass what lies still on neither
-                slow[i] = 0.0
-            if found is None:  # back to its path, as steeply as it can
-                slow[i] = min(slow[i], CREEP * pace[i])
-        # Vessels and rovers set out along the bow, aerial vehicles to where they want to be.
-        level = np.column_stack([side * (want - aside)[:, None], np.zeros(count)])
-        onward = 2 * self.length[:, None] * leg * ~(stands & (want != aside))[:, None]
-        onward += fleet.gather("goal") - position
-        facing = np.where(self.aerial[:, None], onward + level, np.column_stack([bow, np.zeros(count)]))
-        facing *= (going / np.maximum(np.linalg.norm(facing, axis=1), 1e-9))[:, None]
-        passing = (want != 0) | (aside != 0) | ~np.isnan(instead)
-        astern = np.where(self.aerial[:, None], -leg, -np.column_stack([bow, np.zeros(count)]))
-        astern *= (stands & passing)[:, None]
+        held = stands & (self.slow <= CREEP * pace)
+        traffic["slow"] = np.where(held, np.minimum(traffic["slow"], CREEP * pace), traffic["slow"])
+        self._find_room(traffic, going, fleet.gather("rest"))
+        want, aside, leg = traffic["want"], traffic["aside"], traffic["leg"]
+        facing = self._facing(fleet, traffic, bow, going)
+        passing = (want != 0) | (aside != 0) | ~np.isnan(traffic["instead"])
+        astern = np.where(self.aerial[:, None], -leg, -bow) * (stands & passing)[:, None]
         for i in map(int, np.flatnonzero(stands & passing)):
             astern[i] *= self._has_room(i, position[i, :2], 0.5 * self.keep[i] * astern[i, :2], np.zeros(2))
-        slow = np.minimum(slow, fleet.gather("nearing"))
+        slow = np.minimum(traffic["slow"], fleet.gather("nearing"))
         self.wary = brake_in_time(
             position, velocity, rate, facing, pace, self.reach, self.brakes, present, order, passing, astern, slow
         )
         self.slow = slow
         for squad in fleet.squads:
             squad.tracks["slow"], squad.tracks["want"] = slow[squad.index], want[squad.index]
+        end = fleet.gather("ends")[:, 1]
         self._stop_short(fleet, position, end, stands, present & (pace == 0.0))
 
     def _stand(
@@ -128,6 +106,60 @@ class Watch:
         standing = int((stood > WAITS).sum())
         order[:standing] = np.roll(order[:standing], int(time // TURN))
         return order, stood
+
+    def _traffic(
+        self,
+        fleet: Fleet,
+        position: np.ndarray,
+        bow: np.ndarray,
+        speed: np.ndarray,
+        pace: np.ndarray,
+        going: np.ndarray,
+    ) -> np.ndarray:
+        """Return how all are on their ways, (k,) TRAFFIC, but who is there and in which order; `bow` (k, 3) is where they
+        head, `going` (k,) are those that go somewhere.
+        """
+        traffic = np.zeros(len(position), TRAFFIC)
+        course = fleet.gather("course")
+        start, end = fleet.gather("ends").transpose(1, 0, 2)
+        leg = (end - start) * going[:, None] / np.maximum(np.linalg.norm(end - start, axis=1), 1e-9)[:, None]
+        side = np.where(np.any(course != 0.0, axis=1, keepdims=True), course, bow[:, :2])[:, ::-1] * [1.0, -1.0]
+        traffic["position"], traffic["course"], traffic["leg"], traffic["side"] = position, course, leg, side
+        traffic["speed"], traffic["pace"], traffic["aside"] = speed, pace, fleet.gather("shifted")
+        traffic["offset"] = np.sum((position - start)[:, :2] * side, axis=1)
+        traffic["rest"] = np.linalg.norm(end - position, axis=1)
+        traffic["keep"], traffic["reach"] = self.keep, self.reach
+        return traffic
+
+    def _find_room(self, traffic: np.ndarray, going: np.ndarray, rest: np.ndarray) -> None:
+        """Set what the `traffic` wants to what there is room for; one without room stays on its path, or stops.
+
+        `rest` (k,) metres it has to the end of its leg on the plan.
+        """
+        for i in map(int, np.flatnonzero(((traffic["want"] != 0) | (traffic["aside"] != 0)) & going)):
+            me = traffic[i]
+            ahead = me["course"] * min(max(me["speed"], 0.5 * me["pace"]) * AHEAD, rest[i])
+            sides = [w for w in (me["want"], me["instead"]) if not np.isnan(w)]
+            offsets = (*sides, me["aside"], 0.0)
+            here, side = me["position"][:2], me["side"]
+            found = next((w for w in offsets if self._has_room(i, here, ahead, (w - me["aside"]) * side)), None)
+            me["want"] = 0.0 if found is None else found
+            if len(sides) == 2 and me["want"] not in sides:  # it can pass what lies still on neither
+                me["slow"] = 0.0
+            if found is None:  # back to its path, as steeply as it can
+                me["slow"] = min(me["slow"], CREEP * me["pace"])
+
+    def _facing(self, fleet: Fleet, traffic: np.ndarray, bow: np.ndarray, going: np.ndarray) -> np.ndarray:
+        """Return in which direction each that is `going` sets out, (k, 3); zeros for the others.
+
+        Vessels and rovers set out along the `bow` (k, 3), aerial vehicles to where they want to be.
+        """
+        shift = traffic["want"] - traffic["aside"]
+        level = np.column_stack([traffic["side"] * shift[:, None], np.zeros(len(traffic))])
+        onward = 2 * self.length[:, None] * traffic["leg"] * ~(traffic["stands"] & (shift != 0.0))[:, None]
+        onward += fleet.gather("goal") - traffic["position"]
+        facing = np.where(self.aerial[:, None], onward + level, bow)
+        return facing * (going / np.maximum(np.linalg.norm(facing, axis=1), 1e-9))[:, None]
 
     def _stop_short(
         self, fleet: Fleet, position: np.ndarray, end: np.ndarray, stands: np.ndarray, still: np.ndarray
