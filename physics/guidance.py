@@ -11,16 +11,24 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from quarterdeck.geo.angles import wrap
 from quarterdeck.physics.braking import LOOK
+from quarterdeck.physics.legs import (
+    CORNER,
+    SIDEWAYS,
+    arrive,
+    corner,
+    depart,
+    keep_aside,
+    leg_of,
+    step_aside,
+    stops,
+    to_stop,
+    wrapped,
+)
 from quarterdeck.physics.paths import HOLD, IDLE, ROTATE, SAIL
 
 ARRIVED = 1.0  # m: a vessel this near its waypoint has reached it
-CORNER = 0.3  # radians: a ground vehicle stops and turns on the spot at sharper corners
 CUT = 0.3  # m: how far inside a corner a multirotor may pass
-SIDEWAYS = 0.33  # of its speed: how fast one goes aside
-
-_wrap = njit(cache=True)(wrap)
 
 
 @njit(cache=True)
@@ -47,25 +55,25 @@ def guide_vessels(
         _observe_drift(t, psi, velocity[i], rate[i], step)
         ground, before = np.hypot(velocity[i, 0], velocity[i, 1]), t.leg
         if t.mode == HOLD and time >= t.until:
-            _depart(t)
+            depart(t)
         if t.mode == SAIL:
-            _, _, length, along, _ = _leg(t, table, x, y)
+            _, _, length, along, _ = leg_of(t, table, x, y)
             remaining = length - along
-            stop = _stops(t, table, time)
+            stop = stops(t, table, time)
             if stop and (remaining <= ARRIVED):
-                _arrive(t, table, time)
+                arrive(t, table, time)
             elif not stop and remaining <= _wheel_over(t, table, lim, max(ground, 0.3), length):
                 t.leg += 1
                 t.integral = 0.0
         if t.leg != before:
-            _keep_aside(t, table, x, y)
+            keep_aside(t, table, x, y)
         if t.mode == SAIL:
-            tx, ty, length, along, cross = _leg(t, table, x, y)
+            tx, ty, length, along, cross = leg_of(t, table, x, y)
             remaining = length - along
             wanted = min(table[t.leg].speed, max(t.slow, 0.0))
-            if _stops(t, table, time):
+            if stops(t, table, time):
                 wanted = min(wanted, max(np.sqrt(2 * 0.5 * lim.accel * max(remaining - ARRIVED / 2, 0.0)), 0.2))
-            _step_aside(t, lim.speed, step)
+            step_aside(t, lim.speed, step)
             ahead = max(2.5 * lim.length, 1.5 * lim.speed)
             t.cross, t.turning = cross, along < lim.zone or remaining < lim.zone or t.aside != 0
             cross += t.aside
@@ -92,11 +100,11 @@ def guide_vessels(
             continue
         heading[i] = np.arctan2(wy, wx)
         # Without way on it turns on the spot, until it faces where it is to go.
-        if t.mode == SAIL and (ground < 0.3 or speed[i] == 0.0) and abs(_wrap(heading[i] - psi)) > 1.0:
+        if t.mode == SAIL and (ground < 0.3 or speed[i] == 0.0) and abs(wrapped(heading[i] - psi)) > 1.0:
             speed[i] = 0.0
             continue
         # Far off its heading it slows down, to as little as half: the turn is the tighter.
-        ease = min(max(1.5 - 0.625 * abs(_wrap(heading[i] - psi)), 0.5), 1.0)
+        ease = min(max(1.5 - 0.625 * abs(wrapped(heading[i] - psi)), 0.5), 1.0)
         speed[i] = min(np.hypot(wx, wy), lim.max_speed) * ease
 
 
@@ -119,46 +127,46 @@ def guide_rovers(
         t, lim = tracks[i], limits[i]
         x, y, psi, before = pose[i, 0], pose[i, 1], pose[i, 2], t.leg
         if t.mode == HOLD and time >= t.until:
-            _depart(t)
+            depart(t)
             if t.mode == SAIL:
                 t.mode = ROTATE
         near = 0.03 + 0.02 * lim.speed
         if t.mode == SAIL:
-            _, _, length, along, _ = _leg(t, table, x, y)
-            if _stops(t, table, time):
+            _, _, length, along, _ = leg_of(t, table, x, y)
+            if stops(t, table, time):
                 if length - along <= near:
-                    _arrive(t, table, time)
-            elif abs(_corner(t, table)) > CORNER:
+                    arrive(t, table, time)
+            elif abs(corner(t, table)) > CORNER:
                 if length - along <= near:
                     t.leg += 1
                     t.mode = ROTATE
             elif length - along <= 0:
                 t.leg += 1
         if t.leg != before:
-            _keep_aside(t, table, x, y)
+            keep_aside(t, table, x, y)
         speed[i] = turn[i] = 0.0
         if t.mode == HOLD or t.mode == IDLE:
             t.cross, t.turning = 0.0, True
             continue
-        tx, ty, length, along, cross = _leg(t, table, x, y)
-        _step_aside(t, lim.speed, step)
+        tx, ty, length, along, cross = leg_of(t, table, x, y)
+        step_aside(t, lim.speed, step)
         t.cross, t.turning = cross, along < lim.zone or length - along < lim.zone or t.aside != 0
         cross += t.aside
         if t.slow < 0.0:  # astern
             speed[i] = t.slow
             continue
         if t.mode == ROTATE:
-            error = _wrap(np.arctan2(ty, tx) - psi)
+            error = wrapped(np.arctan2(ty, tx) - psi)
             if abs(error) < 0.02 or length < near:
                 t.mode = SAIL
             else:
                 turn[i] = min(max(3.0 * error, -lim.rate), lim.rate)
                 continue
         wanted = min(table[t.leg].speed, t.slow)
-        rest = _to_stop(t, table, time, length - along, velocity[i] ** 2 / lim.accel)
+        rest = to_stop(t, table, time, length - along, velocity[i] ** 2 / lim.accel)
         wanted = min(wanted, _rover_nearing(lim.accel, max(rest - near, 0.0)))
         ahead = max(0.5 * lim.length, 0.8 * abs(velocity[i]))
-        bearing = _wrap(np.arctan2(ty * ahead - tx * cross, tx * ahead + ty * cross) - psi + t.bias)
+        bearing = wrapped(np.arctan2(ty * ahead - tx * cross, tx * ahead + ty * cross) - psi + t.bias)
         if abs(bearing) > (1.0 if t.slow > 0.0 else 0.1):  # pushed off its path, or held: face it first
             turn[i] = min(max(2.0 * bearing, -lim.rate), lim.rate)
             continue
@@ -172,7 +180,7 @@ def nearing_rovers(limits: np.ndarray, tracks: np.ndarray, table: np.ndarray, re
     speed = np.full(len(tracks), np.inf)
     for i in range(len(tracks)):
         t = tracks[i]
-        if t.leg >= t.last or table[t.leg].hold > 0 or abs(_corner(t, table)) > CORNER:
+        if t.leg >= t.last or table[t.leg].hold > 0 or abs(corner(t, table)) > CORNER:
             speed[i] = _rover_nearing(limits[i].accel, rest[i])
     return speed
 
@@ -199,7 +207,7 @@ def guide_multirotors(
     for i in range(len(tracks)):
         t, lim = tracks[i], limits[i]
         if t.mode == HOLD and time >= t.until:
-            _depart(t)
+            depart(t)
             t.reach = t.pace = 0.0
         a, b = table[max(t.leg - 1, t.first)], table[t.leg]
         dx, dy, dz = b.x - a.x, b.y - a.y, b.z - a.z
@@ -214,17 +222,17 @@ def guide_multirotors(
             rate = lim.climb if dz > 0 else lim.sink
             if length > 0 and abs(dz) / length * wanted > rate:
                 wanted = rate * length / abs(dz)
-            leave = 0.0 if _stops(t, table, time) else _corner_speed(t, table, lim.accel)
+            leave = 0.0 if stops(t, table, time) else _corner_speed(t, table, lim.accel)
             wanted = min(wanted, np.sqrt(leave**2 + 2 * 0.7 * lim.accel * max(length - t.reach, 0.0)))
             t.pace = min(max(wanted, t.pace - lim.accel * step), t.pace + 0.7 * lim.accel * step)
             t.reach += max(t.pace, min(0.05, wanted)) * step
             if t.slow < 0.0:  # astern
                 t.pace, t.reach = 0.0, max(t.reach + t.slow * step, 0.0)
             if t.reach >= length:
-                if _stops(t, table, time):
+                if stops(t, table, time):
                     t.reach, t.pace = length, 0.0
                     if gap < 0.5 and abs(t.aside) < 0.2 * lim.length:  # back on its path
-                        _arrive(t, table, time)
+                        arrive(t, table, time)
                 else:
                     t.reach -= length
                     t.leg += 1
@@ -244,7 +252,7 @@ def guide_multirotors(
             before, sin, cos = t.aside, np.sin(reference[i, 6]), np.cos(reference[i, 6])
             # Here the shift is the motion: no faster than it gains in a look, and can stop.
             most = min(LOOK * lim.accel, np.sqrt(lim.accel * abs(t.want - t.aside))) / SIDEWAYS
-            _step_aside(t, min(b.speed, max(t.slow, 0.0), most), step)
+            step_aside(t, min(b.speed, max(t.slow, 0.0), most), step)
             shift = (t.aside - before) / step
             reference[i, 0] += t.aside * sin
             reference[i, 1] -= t.aside * cos
@@ -261,21 +269,6 @@ def guide_multirotors(
 
 
 @njit(cache=True)
-def _step_aside(t: Any, speed: float, step: float) -> None:
-    """Move towards the offset that separation wants, at SIDEWAYS of `speed`."""
-    most = SIDEWAYS * speed * step
-    t.aside += min(max(t.want - t.aside, -most), most)
-
-
-@njit(cache=True)
-def _keep_aside(t: Any, table: np.ndarray, x: float, y: float) -> None:
-    """Carry the offset over to a new leg: one that is aside stays where it is, to port or to starboard of that."""
-    _, _, length, _, cross = _leg(t, table, x, y)
-    if length > 0.0:
-        t.aside = min(max(-cross, -abs(t.aside)), abs(t.aside))
-
-
-@njit(cache=True)
 def _observe_drift(t: Any, psi: float, velocity: np.ndarray, rate: float, step: float) -> None:
     """Track what the water and the wind add to the course steered; in turns the hull slips, so it is left as it was."""
     if abs(rate) > 0.08:
@@ -287,69 +280,9 @@ def _observe_drift(t: Any, psi: float, velocity: np.ndarray, rate: float, step: 
 
 
 @njit(cache=True)
-def _leg(t: Any, table: np.ndarray, x: float, y: float) -> tuple[float, float, float, float, float]:
-    """Return the leg's direction (2), length, and the position's distance along it and to port of it."""
-    a, b = table[max(t.leg - 1, t.first)], table[t.leg]
-    dx, dy = b.x - a.x, b.y - a.y
-    length = np.hypot(dx, dy)
-    if length < 1e-9:
-        return 1.0, 0.0, 0.0, 0.0, 0.0
-    tx, ty = dx / length, dy / length
-    return tx, ty, length, tx * (x - a.x) + ty * (y - a.y), tx * (y - a.y) - ty * (x - a.x)
-
-
-@njit(cache=True)
-def _corner(t: Any, table: np.ndarray) -> float:
-    """Return the signed turn at the end of the leg, radians."""
-    a, b, c = table[max(t.leg - 1, t.first)], table[t.leg], table[min(t.leg + 1, t.last)]
-    if (b.x == a.x and b.y == a.y) or (b.x == c.x and b.y == c.y):
-        return 0.0
-    return _wrap(np.arctan2(c.y - b.y, c.x - b.x) - np.arctan2(b.y - a.y, b.x - a.x))
-
-
-@njit(cache=True)
-def _stops(t: Any, table: np.ndarray, time: float) -> bool:
-    """Whether the vehicle comes to a stop at the end of the leg: to hold, to wait, or for good."""
-    return t.leg >= t.last or table[t.leg].hold > 0 or table[min(t.leg + 1, t.last)].depart > time
-
-
-@njit(cache=True)
-def _to_stop(t: Any, table: np.ndarray, time: float, rest: float, far: float) -> float:
-    """Return the metres to where a rover next stops, `rest` of them on this leg; infinity if it does not within `far`."""
-    leg, stops = t.leg, False
-    while True:
-        stops = _stops(t, table, time) or abs(_corner(t, table)) > CORNER
-        if stops or rest > far:
-            break
-        t.leg += 1
-        a, b = table[t.leg - 1], table[t.leg]
-        rest += np.hypot(b.x - a.x, b.y - a.y)
-    t.leg = leg
-    return rest if stops else np.inf
-
-
-@njit(cache=True)
-def _arrive(t: Any, table: np.ndarray, time: float) -> None:
-    t.integral = 0.0
-    t.until = time + table[t.leg].hold
-    if t.leg < t.last:
-        t.until = max(t.until, table[t.leg + 1].depart)
-    t.mode = HOLD
-
-
-@njit(cache=True)
-def _depart(t: Any) -> None:
-    if t.leg < t.last:
-        t.leg += 1
-        t.mode = SAIL
-    else:
-        t.mode = IDLE
-
-
-@njit(cache=True)
 def _wheel_over(t: Any, table: np.ndarray, lim: Any, ground: float, length: float) -> float:
     """Return how far before the waypoint the turn begins: that of a circle touching both legs, and the time to swing."""
-    half = abs(_corner(t, table)) / 2
+    half = abs(corner(t, table)) / 2
     radius = max(ground / lim.rate, lim.radius * ground / lim.speed)
     turn = radius * min(np.tan(min(half, 1.5)), 2.0) + 0.5 * ground * min(2 * half, 1.0)
     b, c = table[t.leg], table[t.leg + 1]

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from quarterdeck.geo.angles import wrap
 from quarterdeck.physics.braking import TOUCH
-from quarterdeck.physics.guidance import SIDEWAYS
+from quarterdeck.physics.legs import SIDEWAYS, wrapped
 
 HORIZON = 20.0  # s that conflicts are looked for ahead
 STILL = 0.3  # m/s: who is slower lies still
@@ -48,8 +47,6 @@ TRAFFIC = np.dtype(
     + [("present", np.bool_), ("place", np.int64), ("stands", np.bool_)]
     + [(n, float) for n in ("slow", "want", "instead")]
 )
-
-_wrap = njit(cache=True)(wrap)
 
 
 @njit(cache=True)
@@ -134,13 +131,13 @@ def _obey_rules(me: Any, other: Any, first: bool) -> None:
     if np.hypot(px + wx * soon, py + wy * soon) > apart:
         return
     heading = np.arctan2(me.course[1], me.course[0])
-    bearing = _wrap(np.arctan2(py, px) - heading)
+    bearing = wrapped(np.arctan2(py, px) - heading)
     if abs(bearing) > ABAFT and np.hypot(px, py) > CLOSE * apart:  # the other's business
         return
     if first and other.speed < min(TURNS * other.pace, STILL):  # pass it by
         me.want = ROUND * apart
         return
-    meeting = abs(_wrap(np.arctan2(other.course[1], other.course[0]) - heading))
+    meeting = abs(wrapped(np.arctan2(other.course[1], other.course[0]) - heading))
     if meeting > OPPOSITE and abs(bearing) < BEAM:  # head-on: both to starboard
         me.want = MEET * apart
     elif meeting < ALIKE:  # overtaking, or side by side
