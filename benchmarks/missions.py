@@ -18,7 +18,8 @@ from typing import Any
 
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.reason import Reason
-from quarterdeck.mission.recovery import recovering, undone
+from quarterdeck.mission.recovery import recovering
+from quarterdeck.mission.recovery_memory import undone
 from quarterdeck.mission.triage.plan import METHOD
 from quarterdeck.physics.simulate import Run, simulate
 

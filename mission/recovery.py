@@ -7,75 +7,29 @@ When it is heard again, what it has done meanwhile counts, and it takes a part o
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from math import dist, inf
 from typing import Any
 
-import numpy as np
-import shapely
-from shapely import MultiPolygon, Point
-
 from quarterdeck.geo.errors import InputError
-from quarterdeck.geo.scenario import Obstacle, Vehicle, as_multipolygon
+from quarterdeck.geo.scenario import Obstacle, Vehicle
 from quarterdeck.mission.changes import Changes, changed_site, changed_tasks, check_changes
-from quarterdeck.mission.contact import Contact, within_range
+from quarterdeck.mission.contact import within_range
 from quarterdeck.mission.director import Command, Director, Event, State
 from quarterdeck.mission.guard_recovery import prepare
-from quarterdeck.mission.inspection import Memory as Inspected
 from quarterdeck.mission.inspection import default_director
-from quarterdeck.mission.lateness import Course, course, looked, measured_pace
+from quarterdeck.mission.lateness import course, looked, measured_pace
 from quarterdeck.mission.mission import Mission, Route, Waypoint
 from quarterdeck.mission.progress import Progress, surveyed
 from quarterdeck.mission.reason import Reason
+from quarterdeck.mission.recovery_memory import Memory, undone
 from quarterdeck.mission.replan import replan
 from quarterdeck.mission.told import Telling, passed
 from quarterdeck.mission.triage.plan import METHOD
+from quarterdeck.mission.wrecks import obstacles_found, wreck_of
 
-BERTH = 4.0  # lengths from its end: so near, whoever launches and recovers the vehicles clears the way
-COASTS = 2.0  # s at its speed that a vehicle may have gone on from where it was heard last
 DRIFTED = 0.5  # lengths from where one who was given up is thought to lie: only farther off is it worth a new plan
 Tell = Callable[[float, Mission], None]
-
-
-@dataclass(frozen=True, slots=True)
-class _Memory:
-    """What is remembered: the plan followed and since when, what was done before it, who is missed and until when to wait.
-
-    `following` is the route that each vehicle was last told and heard; `used` each vehicle's watt-hours at `since`;
-    `tracks` and `served`, tasks and who did them, are what was done before that plan (of guards: since then); `given_up`
-    who is held for lost; `wake` when the next silence has lasted too long. `barred` are vehicles and the tasks to which
-    they found no way, `undone` what earlier plans told could not be done. `untried` have not been heard of since they were
-    told of the plan: how far they say to have come is how far they had come by the one before it. `sent` are the waypoints
-    that each was commanded last, `serving` the task that it is at by them, and since when. `wrecks` are the ids that those
-    who were given up have as obstacles, by vehicle, `found` the ids of what robots have found. `tellings` are all routes
-    told anew so far, `reliefs` how far those had come whose part was given to others. `courses` say how each gets on with
-    what it was commanded last. `wishes` is how many of the late changes were heeded. `sighted` are the metres x and y
-    at which others saw those who were given up.
-    """
-
-    mission: Mission
-    director: Director
-    following: Mapping[str, Route]
-    since: float = 0.0
-    inner: Any = None
-    tracks: tuple[np.ndarray, ...] = ()
-    served: Mapping[str, str] = field(default_factory=dict)
-    used: Mapping[str, float] | None = None
-    missed: Mapping[str, float] | None = None
-    given_up: frozenset[str] = frozenset()
-    wake: float = inf
-    barred: frozenset[tuple[str, str]] = frozenset()
-    undone: tuple[Reason, ...] = ()
-    untried: frozenset[str] = frozenset()
-    sent: Mapping[str, tuple[Waypoint, ...]] = field(default_factory=dict)
-    serving: Mapping[str, tuple[str, float]] = field(default_factory=dict)
-    wrecks: Mapping[str, str] = field(default_factory=dict)
-    found: frozenset[str] = frozenset()
-    tellings: tuple[Telling, ...] = ()
-    reliefs: Mapping[str, Telling] = field(default_factory=dict)
-    wishes: int = 0
-    sighted: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    courses: Mapping[str, Course] = field(default_factory=dict)
 
 
 def recovering(
@@ -104,7 +58,7 @@ def recovering(
     def direct(
         time: float, states: Mapping[str, State], events: tuple[Event, ...], memory: Any
     ) -> tuple[dict[str, Command], Any]:
-        now: _Memory = memory or _Memory(mission, default_director(mission), {r.vehicle: r for r in mission.routes})
+        now: Memory = memory or Memory(mission, default_director(mission), {r.vehicle: r for r in mission.routes})
         last = {e.vehicle: e.kind for e in events if e.kind in ("lost", "returned")}  # of both in one second
         heard = {v for v, kind in last.items() if kind == "returned"}
         missed = {v: due for v, due in (now.missed or {}).items() if v not in heard}
@@ -136,7 +90,7 @@ def recovering(
         asked = [wish for when, wish in wishes[now.wishes :] if when <= time]
         now = replace(now, wishes=now.wishes + len(asked))
         if due & plan.keys() or back or stale or barred or speeds or asked or moved:
-            found = _found([e.data["found"] for e in barred])
+            found = obstacles_found([e.data["found"] for e in barred])
             after = _replanned(now, mission, time, states, found, speeds, asked, moved.keys(), tell)
             if after.mission is not now.mission:
                 events = tuple(e for e in events if e not in barred)
@@ -156,7 +110,7 @@ def recovering(
 
 
 def _moved(
-    now: _Memory, first: Mapping[str, Vehicle], states: Mapping[str, State], events: Sequence[Event]
+    now: Memory, first: Mapping[str, Vehicle], states: Mapping[str, State], events: Sequence[Event]
 ) -> dict[str, tuple[float, float]]:
     """Return where those who were given up are seen, who lie elsewhere than is known."""
     found = {}
@@ -169,7 +123,7 @@ def _moved(
     return found
 
 
-def _at_work(now: _Memory, time: float, states: Mapping[str, State]) -> dict[str, tuple[str, float]]:
+def _at_work(now: Memory, time: float, states: Mapping[str, State]) -> dict[str, tuple[str, float]]:
     """Return the task that each vehicle is at, of those that are heard and at one, and since when."""
     found = {}
     for name, state in states.items():
@@ -180,7 +134,7 @@ def _at_work(now: _Memory, time: float, states: Mapping[str, State]) -> dict[str
     return found
 
 
-def _speeds(now: _Memory, first: Mapping[str, Vehicle]) -> dict[str, float]:
+def _speeds(now: Memory, first: Mapping[str, Vehicle]) -> dict[str, float]:
     """Return the speeds in m/s of vehicles that are slower or faster than the plan has them."""
     found = {}
     for vehicle in now.mission.vehicles:
@@ -199,7 +153,7 @@ def _at_best(command: Command, first: Vehicle, planned: Vehicle) -> Command:
 
 
 def _replanned(
-    now: _Memory,
+    now: Memory,
     first: Mission,
     time: float,
     states: Mapping[str, State],
@@ -208,32 +162,17 @@ def _replanned(
     asked: Sequence[Changes],
     moved: Collection[str],
     tell: Tell | None,
-) -> _Memory:
+) -> Memory:
     """Return the memory with a new plan for all who are not given up, or, where nobody is left, the old one."""
     planned = {v.id for v in now.mission.vehicles}
     working = {v.id for v in first.vehicles} - now.given_up
     if not working:
         return now
-    used = now.used or {}
-    tracks = list(now.tracks)
-    for name, route in now.following.items() if now.mission.spacing is not None else ():
-        state = states[name]
-        reached = 1 if name in now.untried else min(state.reached + 1, len(route.waypoints))
-        tracks += surveyed(route, reached, (state.x, state.y, state.z))
-    progress = Progress(
-        time=time - now.since,
-        positions={v: (s.x, s.y, s.z) for v, s in states.items()},
-        energy={v: s.energy_used - used.get(v, 0.0) for v, s in states.items()},
-        tracks=tuple(tracks),
-        served=frozenset(now.served),
-        servers=now.served,
-        headings={v: s.heading for v, s in states.items()},
-        begun={task: (v, time - since if states[v].alive else 0.0) for v, (task, since) in now.serving.items()},
-    )
+    progress = _progress(now, time, states)
     lie = {**states, **{v: replace(states[v], x=x, y=y) for v, (x, y) in now.sighted.items()}}
     afloat = (working | set(moved)) & now.wrecks.keys()
     unmarked = sorted(now.given_up - (now.wrecks.keys() - afloat))
-    new = {v: w for v in unmarked if (w := _wreck(first, v, working, lie)) is not None}
+    new = {v: w for v in unmarked if (w := wreck_of(first, v, working, lie)) is not None}
     changes = Changes(
         lost=frozenset(planned & now.given_up),
         back=dict.fromkeys(sorted(working - planned)),
@@ -263,7 +202,7 @@ def _replanned(
         following={**now.following, **told},
         since=time,
         inner=None,
-        tracks=tuple(tracks),
+        tracks=progress.tracks,
         served={} if after.method == "guards" else now.served,  # its layer says what is seen
         used={v: s.energy_used for v, s in states.items()},
         undone=tuple(dict.fromkeys(left)),
@@ -278,7 +217,27 @@ def _replanned(
     )
 
 
-def _telling(now: _Memory, time: float, state: State, route: Route, plan: Mission) -> Telling:
+def _progress(now: Memory, time: float, states: Mapping[str, State]) -> Progress:
+    """Return how far the plan followed has come, with what was surveyed before it."""
+    used = now.used or {}
+    tracks = list(now.tracks)
+    for name, route in now.following.items() if now.mission.spacing is not None else ():
+        state = states[name]
+        reached = 1 if name in now.untried else min(state.reached + 1, len(route.waypoints))
+        tracks += surveyed(route, reached, (state.x, state.y, state.z))
+    return Progress(
+        time=time - now.since,
+        positions={v: (s.x, s.y, s.z) for v, s in states.items()},
+        energy={v: s.energy_used - used.get(v, 0.0) for v, s in states.items()},
+        tracks=tuple(tracks),
+        served=frozenset(now.served),
+        servers=now.served,
+        headings={v: s.heading for v, s in states.items()},
+        begun={task: (v, time - since if states[v].alive else 0.0) for v, (task, since) in now.serving.items()},
+    )
+
+
+def _telling(now: Memory, time: float, state: State, route: Route, plan: Mission) -> Telling:
     """Return that a vehicle is told a route of a new plan, with how far it has come on the one that it had."""
     had, place = now.following[route.vehicle], (state.x, state.y, state.z)
     if route.vehicle in now.untried:
@@ -288,30 +247,6 @@ def _telling(now: _Memory, time: float, state: State, route: Route, plan: Missio
     else:
         reached = min(state.reached + 1, len(had.waypoints))
     return Telling(time, route, place, reached, state.energy_used, plan.guards)
-
-
-def tellings(memory: Any) -> tuple[Telling, ...]:
-    """Return the new routes that the director with this `memory` has told vehicles in a run, in order."""
-    memory = _unwrapped(memory)
-    return memory.tellings if isinstance(memory, _Memory) else ()
-
-
-def relieved(memory: Any) -> dict[str, Telling]:
-    """Return of each vehicle that was given up how far it had come when its part was given to others."""
-    memory = _unwrapped(memory)
-    return dict(memory.reliefs) if isinstance(memory, _Memory) else {}
-
-
-def left_out(memory: Any) -> tuple[Reason, ...]:
-    """Return what the last plan told, by a director that replans, said of what can't be done any more."""
-    memory = _unwrapped(memory)
-    return memory.mission.reasons if isinstance(memory, _Memory) and memory.tellings else ()
-
-
-def followed(memory: Any) -> Mission | None:
-    """Return the last plan that a director made in a run; None where it made none."""
-    memory = _unwrapped(memory)
-    return memory.mission if isinstance(memory, _Memory) and memory.tellings else None
 
 
 def asked_for(mission: Mission, wishes: Sequence[Changes]) -> Mission:
@@ -332,42 +267,3 @@ def asked_for(mission: Mission, wishes: Sequence[Changes]) -> Mission:
         check_changes(mission, wish)
         mission = replace(mission, site=changed_site(mission.site, wish), tasks=changed_tasks(mission.tasks, wish))
     return mission
-
-
-def undone(memory: Any) -> tuple[Reason, ...]:
-    """Return what a director's `memory` says will not be done, and why."""
-    memory = _unwrapped(memory)
-    if isinstance(memory, _Memory):
-        return tuple(dict.fromkeys((*memory.undone, *undone(memory.inner))))
-    if isinstance(memory, Inspected):
-        told = [Reason(why, "undone", task) for task, why in memory.abandoned.items()]
-        return (*told, *(Reason("found no way home", "end", vehicle) for vehicle in sorted(memory.stranded)))
-    return ()
-
-
-def _unwrapped(memory: Any) -> Any:
-    """Return the memory of the director that decides, without what `contact` adds to it."""
-    return memory.inner if isinstance(memory, Contact) else memory
-
-
-def _found(found: list[MultiPolygon]) -> tuple[Obstacle, ...]:
-    """Return all that robots found as obstacles for vehicles on the ground."""
-    parts = as_multipolygon(shapely.union_all(found)).geoms
-    return tuple(Obstacle(f"found-{n}", part, frozenset({"ground"})) for n, part in enumerate(parts, start=1))
-
-
-def _wreck(first: Mission, lost: str, working: set[str], states: Mapping[str, State]) -> Obstacle | None:
-    """Return a vehicle that is given up as an obstacle to its kind: its hull, and as far as it went on unheard.
-
-    None where it fell from the air, or lies at somebody's berth, where it is seen to.
-    """
-    vehicle, state = first.vehicle(lost), states[lost]
-    here, length = Point(state.x, state.y), vehicle.model.length
-    if vehicle.domain == "aerial" or any(here.distance(Point(v.home)) < BERTH * length for v in first.vehicles):
-        return None
-    hull = 0.5 * float(np.hypot(length, vehicle.model.width))
-    free = min((here.distance(Point(states[v].x, states[v].y)) for v in working), default=inf)
-    radius = min(hull + COASTS * vehicle.speed, 0.9 * free)
-    if radius <= 0:
-        return None
-    return Obstacle(f"wreck of {lost}", here.buffer(radius, quad_segs=4), frozenset({vehicle.domain}))

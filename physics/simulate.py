@@ -16,7 +16,8 @@ from quarterdeck.mission.director import Director
 from quarterdeck.mission.fast import run_fast
 from quarterdeck.mission.inspection import default_director
 from quarterdeck.mission.mission import Mission
-from quarterdeck.mission.recovery import asked_for, followed, left_out, relieved, tellings, undone
+from quarterdeck.mission.recovery import asked_for
+from quarterdeck.mission.recovery_memory import followed, left_out, relieved, tellings, undone
 from quarterdeck.mission.served import served_tasks
 from quarterdeck.mission.told import as_told
 from quarterdeck.mission.triage.plan import METHOD, run_plan

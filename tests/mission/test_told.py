@@ -13,7 +13,8 @@ from quarterdeck.mission.assign import assign
 from quarterdeck.mission.check import unsound
 from quarterdeck.mission.cover import cover
 from quarterdeck.mission.guards import plan_guards
-from quarterdeck.mission.recovery import recovering, tellings
+from quarterdeck.mission.recovery import recovering
+from quarterdeck.mission.recovery_memory import tellings
 from quarterdeck.mission.told import as_told
 from quarterdeck.mission.world import Actor, Fault, run_world
 
