@@ -6,6 +6,8 @@ from functools import lru_cache
 import numpy as np
 from pyproj import Transformer
 
+MAX_RADIUS = 200_000.0  # m from the frame's origin: beyond it the projection's scale is off by more than 0.05 %
+
 
 @dataclass(frozen=True, slots=True)
 class Frame:

@@ -7,33 +7,29 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from shapely import MultiPoint, MultiPolygon, Point
+from shapely import MultiPoint, MultiPolygon
 from shapely.ops import unary_union
 
+from quarterdeck.geo.actors import read_task, read_vehicle, task_problems, vehicle_problems, xy_of
 from quarterdeck.geo.depths import least_depth, read_soundings
 from quarterdeck.geo.errors import InputError
-from quarterdeck.geo.frame import Frame
+from quarterdeck.geo.frame import MAX_RADIUS, Frame
 from quarterdeck.geo.geojson import Document, opened, position_problem, positions, read_corridor, read_polygon
 from quarterdeck.geo.kinds import CHANGES, SITE, kind_of_json
-from quarterdeck.geo.models import DEFAULT_MODEL, load_model
 from quarterdeck.geo.properties import GEOMETRIES, LINES, property_problems
 from quarterdeck.geo.scenario import (
-    CEILING,
     DOMAINS,
     Area,
     Casualty,
     Obstacle,
-    Precedence,
     Scenario,
     Site,
     Task,
     Vehicle,
     as_multipolygon,
 )
-from quarterdeck.geo.sensors import fit
 
 POINTS = ("casualty", "medic", "rendezvous")
-MAX_RADIUS = 200_000.0  # m from the frame's origin: beyond it the projection's scale is off by more than 0.05 %
 
 
 def read_scenario(source: str | Path | Document) -> Scenario:
@@ -111,15 +107,15 @@ def _read(
         problems.append(f"areas give different spacings ({', '.join(f'{s:g}' for s in spacings)}); give one")
     soundings = read_soundings([f for f in features if f["role"] == "sounding"], frame)
     least = least_depth(soundings, [shapes[f["place"]] for f in features if f["role"] == "area" and f["place"] in shapes])
-    vehicles = [_vehicle(f, frame, problems, least) for f in features if f["role"] == "vehicle"]
+    vehicles = [read_vehicle(f, frame, problems, least) for f in features if f["role"] == "vehicle"]
     problems += [*_repeated(features, "area"), *_repeated(features, "vehicle")]
-    tasks = tuple(_task(f, frame) for f in features if f["role"] == "task")
+    tasks = tuple(read_task(f, frame) for f in features if f["role"] == "task")
     if len(features) == len(counted):  # else what a task comes after may be among those left out
-        problems += _task_problems(tasks, others)
+        problems += task_problems(tasks, others)
     if problems:
         return None, problems
     fleet = tuple(v for v in vehicles if v is not None)
-    points = {role: tuple((f["id"], _xy(f, frame)) for f in features if f["role"] == role) for role in POINTS}
+    points = {role: tuple((f["id"], xy_of(f, frame)) for f in features if f["role"] == role) for role in POINTS}
     site = _site(features, shapes, [*fleet, *tasks], [xy for r in points for _, xy in points[r]])
     scenario = Scenario(
         name=content["name"] if isinstance(content.get("name"), str) else document.stem,
@@ -128,7 +124,7 @@ def _read(
         vehicles=fleet,
         tasks=tasks,
         casualties=tuple(
-            Casualty(f["id"], _xy(f, frame), f["properties"].get("colour") or "red")
+            Casualty(f["id"], xy_of(f, frame), f["properties"].get("colour") or "red")
             for f in features
             if f["role"] == "casualty"
         ),
@@ -138,7 +134,7 @@ def _read(
         input_hash=hashlib.sha256(document.data).hexdigest(),
         soundings=soundings,
     )
-    problems += _vehicle_problems(features, scenario)
+    problems += vehicle_problems([f for f in features if f["role"] == "vehicle"], fleet, site)
     return (None if problems else scenario), problems
 
 
@@ -247,79 +243,6 @@ def _shapes(features: Sequence[dict[str, Any]], frame: Frame, problems: list[str
     return shapes
 
 
-def _xy(feature: dict[str, Any], frame: Frame) -> tuple[float, float]:
-    x, y = frame.to_metres(np.array(feature["geometry"]["coordinates"][:2], dtype=float))[0]
-    return float(x), float(y)
-
-
-def _vehicle(feature: dict[str, Any], frame: Frame, problems: list[str], depth: float | None) -> Vehicle | None:
-    """Return a vehicle, its model's figures where it gives none of its own; None where something is wrong with it."""
-    given = {k: v for k, v in feature["properties"].items() if v is not None}
-    found, end, sensor, model = list[str](), None, None, load_model(DEFAULT_MODEL[given.get("domain", "surface")])
-    try:
-        model = load_model(given.get("model", model.name))
-        if given.get("domain", model.domain) != model.domain:
-            found.append(f"domain {given['domain']} contradicts model {model.name} ({model.domain})")
-        elif given.get("speed", 0) > model.max_speed:
-            found.append(f"speed {given['speed']:g} m/s exceeds {model.name}'s {model.max_speed:g} m/s")
-    except InputError as error:
-        found.append(str(error))
-    if problem := position_problem(given["end"]) if "end" in given else None:
-        found.append(f"end: {problem}")
-    elif "end" in given:
-        x, y = frame.to_metres(np.array(given["end"][:2], dtype=float))[0]
-        end = (float(x), float(y))
-        if not np.hypot(x, y) <= MAX_RADIUS:
-            found.append(f"end is more than {MAX_RADIUS / 1000:.0f} km from the site's centre")
-    altitude = float(given.get("altitude", model.altitude))
-    if "sensor" in given and feature["whole"] and not found:  # what it sees depends on the rest
-        try:
-            sensor, altitude = fit(given["sensor"], given.get("altitude"), model.altitude, depth)
-        except InputError as error:
-            found.append(f"sensor: {error}")
-    if found:
-        problems += [f"{feature['place']}: {problem}" for problem in found]
-        return None
-    return Vehicle(
-        id=feature["id"],
-        model=model,
-        start=_xy(feature, frame),
-        end=end,
-        share=given.get("share"),
-        speed=float(given.get("speed", model.speed)),
-        turn_radius=float(given.get("turn_radius", model.turn_radius)),
-        clearance=float(given.get("clearance", model.clearance)),
-        endurance=float(given.get("endurance", float("inf"))),
-        battery=float(given.get("battery", model.battery)),
-        altitude=altitude if model.domain == "aerial" else 0.0,
-        sensor=sensor,
-        range=given.get("range"),
-        can=frozenset(given.get("can", ())),
-        returns=given.get("returns", True),
-        ceiling=float(given.get("ceiling", CEILING)),
-        ceiling_amsl=float(given.get("ceiling_amsl", float("inf"))),
-    )
-
-
-def _task(feature: dict[str, Any], frame: Frame) -> Task:
-    given = {k: v for k, v in feature["properties"].items() if v is not None}
-    after = tuple(
-        Precedence(a) if isinstance(a, str) else Precedence(a["task"], a.get("mode", "finish_to_start"))
-        for a in given.get("after", ())
-    )
-    low, high = given.get("window", (0.0, float("inf")))
-    return Task(
-        id=feature["id"],
-        position=_xy(feature, frame),
-        priority=given.get("priority", 0),
-        service_time=float(given.get("service_time", 0.0)),
-        after=after,
-        needs=frozenset(given.get("needs", ())),
-        domain=given.get("domain"),
-        window=(float(low), float(high)),
-    )
-
-
 def _site(
     features: Sequence[dict[str, Any]],
     shapes: dict[str, MultiPolygon],
@@ -363,37 +286,4 @@ def _repeated(features: Sequence[dict[str, Any]], role: str) -> list[str]:
         if f["id"] in seen:
             problems.append(f"{f['place']}: the id {f['id']!r} belongs to {seen[f['id']]} too; give each its own")
         seen[f["id"]] = f["place"]
-    return problems
-
-
-def _vehicle_problems(features: Sequence[dict[str, Any]], scenario: Scenario) -> list[str]:
-    problems: list[str] = []
-    site = scenario.site
-    for f, vehicle in zip([f for f in features if f["role"] == "vehicle"], scenario.vehicles, strict=True):
-        for what, xy in (("stands", vehicle.start), ("ends", vehicle.home)):
-            point = Point(xy)
-            inside = [o.id for o in site.obstacles if vehicle.domain in o.blocks and o.polygon.contains(point)]
-            if inside:
-                problems.append(f"{f['place']}: {what} inside obstacle {inside[0]!r}; move it out")
-            elif not site.operating.covers(point):
-                problems.append(
-                    f"{f['place']}: {what} outside the operating area, by {site.operating.distance(point):,.0f} m"
-                )
-            if vehicle.end is None:
-                break
-    return problems
-
-
-def _task_problems(tasks: Sequence[Task], others: Collection[str]) -> list[str]:
-    ids = [t.id for t in tasks]
-    problems = [f"task {i!r}: its id is given twice" for i in sorted({i for i in ids if ids.count(i) > 1})]
-    ids += others
-    for task in tasks:
-        for before in task.after:
-            if before.task not in ids:
-                near = get_close_matches(before.task, ids, n=1)
-                hint = f"; did you mean {near[0]!r}?" if near else ""
-                problems.append(f"task {task.id!r}: after names the unknown task {before.task!r}{hint}")
-        if not 0 <= task.window[0] <= task.window[1]:
-            problems.append(f"task {task.id!r}: window {list(task.window)} must be [earliest, latest], earliest first")
     return problems

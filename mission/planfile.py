@@ -17,13 +17,12 @@ from shapely.geometry import shape as from_geojson
 
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.features import collection, degrees, feature, geometry, point_feature, polygon_feature, position
-from quarterdeck.geo.frame import Frame
+from quarterdeck.geo.frame import MAX_RADIUS, Frame
 from quarterdeck.geo.geojson import Document, opened
 from quarterdeck.geo.kinds import kind_of_json
 from quarterdeck.geo.models import VehicleModel
 from quarterdeck.geo.palette import CASUALTY
 from quarterdeck.geo.properties import PROPERTIES, property_problems
-from quarterdeck.geo.reader import MAX_RADIUS
 from quarterdeck.geo.scenario import Area, Casualty, Obstacle, Precedence, Sensor, Site, Task, Vehicle, as_multipolygon
 from quarterdeck.geo.typed import fits, wrong_field
 from quarterdeck.mission.layers import drawn, fleet_colours, undrawn

@@ -131,8 +131,8 @@ def _entry(lonlat: tuple[float, float], frame: "Frame") -> tuple[float, float]:
     import numpy as np
 
     from quarterdeck.geo.errors import InputError
+    from quarterdeck.geo.frame import MAX_RADIUS
     from quarterdeck.geo.geojson import position_problem
-    from quarterdeck.geo.reader import MAX_RADIUS
 
     if problem := position_problem(list(lonlat)):
         raise InputError(f"--entry: {problem}")
