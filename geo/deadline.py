@@ -8,13 +8,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
 
 from quarterdeck.geo.errors import OutOfTimeError
 
 
 @dataclass
 class Limit:
-    """A limit: when it `ends` on the monotonic clock, whether Ctrl-C was pressed, and what was `cut` short by it."""
+    """A limit: when it `ends` on `running_time`, whether Ctrl-C was pressed, and what was `cut` short by it."""
 
     ends: float
     interrupted: bool = False
@@ -32,14 +34,14 @@ _ADVICE: ContextVar[str] = ContextVar("advice", default="")  # to whom nothing c
 
 @contextmanager
 def limited(seconds: float | None = None, *, interruptible: Callable[[], None] | None = None) -> Iterator[Limit]:
-    """Have searches and runs within end after `seconds`, and when what is around them has to end.
+    """Have searches and runs within end after `seconds` of `running_time`, and when what is around them has to end.
 
     With `interruptible` at the first Ctrl-C too (in the main thread, which alone hears it), when it is called to say so.
     What cannot be cut, since there would be no result without it, still takes its time; a second Ctrl-C ends it.
     """
     limit = _LIMIT.get() or Limit(math.inf)
     ended = limit.ends
-    limit.ends = min(ended, time.monotonic() + (math.inf if seconds is None else seconds))
+    limit.ends = ended if seconds is None else min(ended, running_time() + seconds)
     token = _LIMIT.set(limit)
 
     def stop(*_: object) -> None:
@@ -63,7 +65,7 @@ def limited(seconds: float | None = None, *, interruptible: Callable[[], None] |
 def time_is_up(what: str) -> bool:
     """Tell whether the limit is reached; `what`, in the user's words, is then noted as cut short."""
     limit = _LIMIT.get()
-    if limit is None or not (limit.interrupted or time.monotonic() >= limit.ends):
+    if limit is None or not (limit.interrupted or (limit.ends < math.inf and running_time() >= limit.ends)):
         return False
     if what not in limit.cut:
         limit.cut.append(what)
@@ -92,10 +94,36 @@ def go_on(what: str) -> None:
 def time_left() -> float | None:
     """Return the seconds until the limit, for what waits; None where there is none."""
     limit = _LIMIT.get()
-    return None if limit is None or limit.ends == math.inf else max(0.0, limit.ends - time.monotonic())
+    return None if limit is None or limit.ends == math.inf else max(0.0, limit.ends - running_time())
 
 
 def cause() -> str:
     """Return why the time is up: `interrupted` or `time limit`; nothing where there is no limit."""
     limit = _LIMIT.get()
     return "" if limit is None else limit.cause
+
+
+def running_time() -> float:
+    """Return seconds that pass but while hot loops are compiled: that is once after installation, and no part of a run."""
+    return time.monotonic() - _compiling().seconds
+
+
+@cache
+def _compiling() -> Any:
+    """Return what counts in `seconds` how long numba has compiled from now on."""
+    from numba.core import event
+
+    class Counted(event.Listener):
+        depth, began, seconds = 0, 0.0, 0.0
+
+        def on_start(self, _: Any) -> None:
+            self.began = self.began if self.depth else time.monotonic()
+            self.depth += 1
+
+        def on_end(self, _: Any) -> None:
+            self.depth -= 1
+            self.seconds += 0.0 if self.depth else time.monotonic() - self.began
+
+    counted = Counted()
+    event.register("numba:compile", counted)
+    return counted

@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from scipy.ndimage import distance_transform_edt
 
+from quarterdeck.geo.deadline import go_on
 from quarterdeck.geo.occupancy import Occupancy
 
 Heuristic = Literal["none", "octile", "manhattan"]
@@ -43,6 +44,8 @@ def find_ways(occupancy: Occupancy, free: np.ndarray, points: np.ndarray, heuris
     `none` is one Dijkstra search a source that ends when all other points are reached: the fastest for a few dozen points.
     `octile` is A* for each pair with the admissible heuristic, so as short. `manhattan` is the paper's heuristic,
     inadmissible where diagonal steps are allowed: its ways may be longer. A point on a cell that is not free has no way.
+
+    Raises OutOfTimeError where it is abandoned.
     """
     m = len(points)
     where = occupancy.to_cells(points)
@@ -61,12 +64,15 @@ def find_ways(occupancy: Occupancy, free: np.ndarray, points: np.ndarray, heuris
     walled[1:-1, 1:-1] = free
     goal = np.where(flat < 0, -1, (flat // columns + 1) * (columns + 2) + flat % columns + 1)
     kind = HEURISTICS.index(heuristic)
+    found, wanted = 0, int(np.sum(goal >= 0)) * (int(np.sum(goal >= 0)) - 1) // 2
     scratch = np.empty(walled.size), np.empty(walled.size, np.int32)
     for i in range(m):
         later = np.flatnonzero(goal[i + 1 :] >= 0) + i + 1
         if goal[i] < 0 or not len(later):
             continue
         for targets in [later] if kind == 0 else [later[q : q + 1] for q in range(len(later))]:
+            go_on(f"the search for ways after {found:,} of {wanted:,} between tasks and depots")
+            found += len(targets)
             cost, before = scratch
             expanded += grow(walled, int(goal[i]), goal[targets], kind, cost, before)
             for j in targets.tolist():

@@ -3,7 +3,6 @@
 Digital twin, shortest ways between all tasks and depots, search for who does what when, routes.
 """
 
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from typing import Any, Literal
@@ -11,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from shapely import Point
 
+from quarterdeck.geo.deadline import running_time
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.gridpath import Heuristic
 from quarterdeck.geo.occupancy import Occupancy
@@ -46,7 +46,7 @@ def assign(
     iterations: int = ITERATIONS,
     time_limit: float | None = None,
     seed: int = 0,
-    clock: Callable[[], float] = time.monotonic,
+    clock: Callable[[], float] = running_time,
     progress: Callable[[int, float, float], None] | None = None,
 ) -> Mission:
     """Return the mission in which the scenario's vehicles do its tasks.

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from quarterdeck.geo.deadline import go_on
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.gridpath import Heuristic, Ways, find_ways, nearest_free
 from quarterdeck.geo.occupancy import Occupancy, site_occupancy
@@ -63,7 +64,8 @@ def travel(
 
     A vehicle that turns on the spot is given a right angle's turn at each task, since its next leg is not known yet;
     `plain` times, the paper's, are metres along the grid over speed, no turns. `quick`: ways are found on the site's own
-    polygons instead of a map, in milliseconds. Raises InputError if there are too many points for all ways to be held.
+    polygons instead of a map, in milliseconds. Raises InputError if there are too many points for all ways to be held, and
+    OutOfTimeError where it is abandoned.
     """
     vehicles, n, k = scenario.vehicles, len(scenario.tasks), len(scenario.vehicles)
     _refuse_too_many(scenario)
@@ -170,6 +172,7 @@ def _seconds(vehicle: Vehicle, ways: Ways | PolygonWays) -> np.ndarray:
     if isinstance(ways, PolygonWays):
         return np.asarray(seconds + ways.turning(vehicle))
     for i, row in enumerate(ways.paths):
+        go_on(f"the count of turns on the ways after {i:,} of {len(ways.paths):,} tasks and depots")
         for j, path in enumerate(row):
             if path is not None and len(path) > 2:
                 seconds[i, j] += turn_times(vehicle, path).sum()

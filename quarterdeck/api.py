@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from quarterdeck.geo.addons import METHODS, addon, addon_names
-from quarterdeck.geo.deadline import limited
+from quarterdeck.geo.deadline import abandoning, limited
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.reader import read_scenario
 from quarterdeck.geo.scenario import Scenario
@@ -96,10 +96,14 @@ def default_method(scenario: Scenario) -> Method:
 
 
 def assign(scenario: Scenario, *, seed: int = 0, time_limit: float | None = None, **options: Any) -> Mission:
-    """Return a mission in which the scenario's vehicles do its tasks (`quarterdeck.mission.assign.assign`)."""
+    """Return a mission in which the scenario's vehicles do its tasks (`quarterdeck.mission.assign.assign`).
+
+    Raises OutOfTimeError if `time_limit` seconds do not suffice for the ways between tasks.
+    """
     from quarterdeck.mission.assign import assign as share_out
 
-    return _at_height(within(time_limit, lambda: share_out(scenario, seed=seed, time_limit=time_limit, **options)))
+    with abandoning("allow more time, or give a coarser resolution or fewer tasks"):
+        return _at_height(within(time_limit, lambda: share_out(scenario, seed=seed, time_limit=time_limit, **options)))
 
 
 def simulate(mission: Mission, **options: Any) -> Any:

@@ -1,12 +1,11 @@
 """The search as a whole: generations until a budget of iterations, a deadline, a proof or Ctrl-C ends it."""
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from quarterdeck.geo.deadline import cause, time_is_up
+from quarterdeck.geo.deadline import cause, running_time, time_is_up
 from quarterdeck.mission.tours.bound import lower_bound
 from quarterdeck.mission.tours.genetic import generation, population, settle
 from quarterdeck.mission.tours.problem import Problem
@@ -48,7 +47,7 @@ def search(
     time_limit: float | None = None,
     first: Sequence[Sequence[int]] | None = None,
     seed: int = 0,
-    clock: Callable[[], float] = time.monotonic,
+    clock: Callable[[], float] = running_time,
     progress: Callable[[int, float, float], None] | None = None,
 ) -> Solution:
     """Return the best solution found; the same for the same problem, seed and iterations, unless `time_limit` cuts it.

@@ -2,10 +2,12 @@
 
 import os
 import signal
+import time
 
 import pytest
+from numba.core import event
 
-from quarterdeck.geo.deadline import cause, limited, time_is_up
+from quarterdeck.geo.deadline import cause, limited, time_is_up, time_left
 
 
 def test_without_a_limit_time_is_never_up():
@@ -30,6 +32,21 @@ def test_a_limit_that_is_not_reached_cuts_nothing():
     with limited(3600.0) as limit:
         assert not time_is_up("one")
     assert limit.cut == []
+
+
+def test_compiling_counts_for_nothing(monkeypatch):
+    """A minute in which numba compiles, one function within another, takes nothing from five seconds; six others do."""
+    now = time.monotonic()
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    with limited(5.0):
+        for begins in (True, True, False, False):
+            (event.start_event if begins else event.end_event)("numba:compile")
+            now += 20.0 if begins else 0.0
+        now += 4.0
+        assert not time_is_up("one")
+        assert time_left() == pytest.approx(1.0)
+        now += 2.0
+        assert time_is_up("one")
 
 
 def test_a_limit_within_another_ends_with_it_and_is_gone_after():

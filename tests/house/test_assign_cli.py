@@ -55,7 +55,7 @@ def test_the_map_written_can_be_driven_on(tmp_path):
         ("--weights", "0,1,2,3"),
         ("--heuristic", "manhattan"),
         ("--heuristic", "octile", "--resolution", "0.2"),
-        ("--time-limit", "0.01"),
+        ("--time-limit", "60"),
     ],
 )
 def test_every_option_plans(options):

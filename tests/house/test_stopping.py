@@ -113,6 +113,25 @@ def test_an_interrupted_simulation_reports_so_far(hall, tmp_path):
     assert "the run was stopped at 4 s of the mission (interrupted)" in json.loads(report.read_text())["reasons"]
 
 
+def test_ways_between_tasks_end_at_a_time_limit(tmp_path, capsys):
+    """Without all ways there is no plan: one line says how many there are, and nothing is written."""
+    path, site = tmp_path / "plan.geojson", DATA / "inspection_hall.geojson"
+    assert status("assign", site, "--time-limit", "0.001", "-o", path) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 1
+    assert "time limit: it ended the search for ways after 0 of 36 between tasks and depots" in said[0]
+    assert not path.exists()
+
+
+def test_an_assignment_interrupted_among_its_ways_leaves_nothing(tmp_path):
+    """Ctrl-C between two searches for ways: 130, no file."""
+    path, site = tmp_path / "plan.geojson", DATA / "inspection_hall.geojson"
+    done = interrupted("quarterdeck.geo", "gridpath", "grow", 3, "assign", site, "-o", path)
+    assert done.returncode == 130
+    assert done.stderr.splitlines()[-1] == "quarterdeck: interrupted"
+    assert not path.exists()
+
+
 def test_an_interrupted_assignment_is_the_best_so_far(tmp_path):
     """Ctrl-C in the search: the plan is written and says so."""
     path, site = tmp_path / "plan.geojson", DATA / "inspection_hall.geojson"
