@@ -20,6 +20,7 @@ import numpy as np
 import shapely
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
+from PIL import Image
 from shapely.plotting import plot_polygon
 
 from quarterdeck.cli import main as quarterdeck
@@ -50,6 +51,33 @@ COMMANDS = {
     ],
     "guards": ["reproduce guards -o guards.png", "guards.png"],
     "assignment": ["reproduce inspection -o .", "inspection_precedence.png"],
+    "export": [
+        "init air -o farm.geojson",
+        "plan farm.geojson -o plan.geojson",
+        "export plan.geojson --to png -o .",
+        "Farm_survey.png",
+    ],
+    "run": [
+        "plan data/west_ant_island.geojson -o plan.geojson",
+        "simulate plan.geojson --picture run.png",
+        "run.png",
+    ],
+    "survey": [
+        "plan harbour.geojson -o plan.geojson",
+        "simulate plan.geojson --current 0.2,0.1 --wind 3,-2 --gusts 1 --picture run.png",
+        "run.png",
+    ],
+    "inspect": [
+        "init ground -o yard.geojson",
+        "plan yard.geojson --method guards --range 20 -o guards.geojson",
+        "export guards.geojson --to png -o .",
+        "Plant_yard.png",
+    ],
+    "drill": [
+        "init triage -o drill.geojson",
+        "triage drill.geojson -o casualties.geojson --timeline timeline.png",
+        "timeline.png",
+    ],
     "triage": ["reproduce triage --cases 2 --figures .", "fig6.png"],
     "replan": [
         "plan data/plant_yard.geojson -o plan.geojson",
@@ -73,6 +101,7 @@ def main(names: tuple[str, ...]) -> None:
     drawn: dict[str, Callable[[], bytes]] = {"placement": placement, "division": division}
     for name in names or (*drawn, *COMMANDS):
         data = drawn[name]() if name in drawn else by_commands(COMMANDS[name])
+        data = _small(data)
         (HERE / "pictures" / f"{name}.png").write_bytes(data)
         click.echo(f"docs/pictures/{name}.png: {len(data) / 1000:.0f} kB")
 
@@ -83,10 +112,23 @@ def by_commands(commands: list[str]) -> bytes:
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         Path("data").symlink_to(DATA)
         Path("crates.geojson").write_text(json.dumps(crates()), encoding="utf-8")
+        Path("harbour.geojson").write_text(harbour(), encoding="utf-8")
         for line in lines:
             with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):
                 quarterdeck(shlex.split(line))
         return Path(picture).read_bytes()
+
+
+def _small(data: bytes) -> bytes:
+    """Return a PNG in 256 colours, a third of the size."""
+    stream = io.BytesIO()
+    Image.open(io.BytesIO(data)).convert("RGB").quantize(256, dither=Image.Dither.NONE).save(stream, "png", optimize=True)
+    return stream.getvalue()
+
+
+def harbour() -> str:
+    """Return the site of the tutorial of a survey, as it stands there."""
+    return (HERE / "tutorials" / "survey.md").read_text(encoding="utf-8").split("```json\n")[1].split("```")[0]
 
 
 def crates() -> dict[str, object]:

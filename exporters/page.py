@@ -8,8 +8,11 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from quarterdeck.exporters.casualties import MEANING
 from quarterdeck.exporters.export import Settings
 from quarterdeck.exporters.places import file_stems, spacing_words
+from quarterdeck.geo.palette import CASUALTY
+from quarterdeck.geo.scenario import Obstacle
 from quarterdeck.mission.layers import fleet_colours
 from quarterdeck.mission.mission import Mission, Route
 
@@ -40,6 +43,7 @@ def page(mission: Mission) -> str:
         "TITLE": escape(mission.name),
         "LINE": escape(f"{mission.method}{spacing}, seed {mission.seed}: {state}"),
         "SITE": _site(mission),
+        "KEY": _key(mission),
         "ROUTES": "".join(_route(*route) for route in routes),
         "ROWS": "".join(_row(*route) for route in routes),
         "FACTS": json.dumps(facts, allow_nan=False),
@@ -61,15 +65,54 @@ def _way(route: Route) -> list[list[float]]:
 
 def _site(mission: Mission) -> str:
     shapes = [f'<path class="operating" d="{_outline(mission.site.operating)}"/>']
-    named = [("area", a.id, a.polygon) for a in mission.site.areas]
-    named += [("obstacle", o.id, o.polygon) for o in mission.site.obstacles]
+    named = [("area", f"{a.id}, priority {a.priority}", a.polygon) for a in mission.site.areas]
+    named += [(_kind(mission, o), o.id, o.polygon) for o in mission.site.obstacles]
     for kind, name, polygon in named:
         shapes.append(f'<path class="{kind}" d="{_outline(polygon)}"><title>{escape(name)}</title></path>')
     shapes += [
         f'<path class="task" d="M{t.position[0]:.2f} {-t.position[1]:.2f}h0"><title>{escape(t.id)}</title></path>'
         for t in mission.tasks
     ]
+    shapes += [
+        f'<path class="hurt rim" d="{(d := f"M{c.position[0]:.2f} {-c.position[1]:.2f}h0")}"/>'
+        f'<path class="hurt" stroke="{CASUALTY[c.colour]}" d="{d}"><title>{escape(c.id)}, {c.colour}</title></path>'
+        for c in mission.casualties
+    ]
+    shapes += [
+        f'<path class="lost" d="M{v.start[0]:.2f} {-v.start[1]:.2f}h0"><title>{escape(v.id)} lost</title></path>'
+        for v in mission.lost
+    ]
     return "".join(shapes)
+
+
+def _kind(mission: Mission, obstacle: Obstacle) -> str:
+    """Whether any of the vehicles has to keep out of an obstacle, or it is only not covered."""
+    return "obstacle" if obstacle.blocks & {v.domain for v in mission.vehicles} else "crossed"
+
+
+def _key(mission: Mission) -> str:
+    """Return the legend of what is on the map besides the vehicles."""
+    kinds = {_kind(mission, o) for o in mission.site.obstacles}
+    signs = [
+        ("survey", "survey", any(route.survey.any() for route in mission.routes)),
+        ("transit", "transit, turn", any(not route.survey[1:].all() for route in mission.routes)),
+        ("area", "area", bool(mission.site.areas)),
+        ("operating", "operating area", True),
+        ("obstacle", "obstacle", "obstacle" in kinds),
+        ("crossed", "not covered, may be crossed", "crossed" in kinds),
+        ("task", "task", bool(mission.tasks)),
+        ("lost", "lost", bool(mission.lost)),
+    ]
+    lines = [(f'<path class="{name}" stroke="#333"', text) for name, text, there in signs if there]
+    hurt = {c.colour for c in mission.casualties}
+    lines += [(f'<path class="hurt" stroke="{CASUALTY[c]}"', f"casualty: {c} ({MEANING[c]})") for c in MEANING if c in hurt]
+    shapes = dict.fromkeys(("area", "operating", "obstacle", "crossed"), "M1 1h24v10h-24z")
+    shapes |= dict.fromkeys(("survey", "transit"), "M1 6h24")
+    key = ""
+    for sign, text in lines:
+        place = shapes.get(sign.split('"')[1], "M13 6h0")
+        key += f'<svg width="26" height="12" viewBox="0 0 26 12">{sign} d="{place}"/></svg> {text}<br>'
+    return key
 
 
 def _outline(geometry: BaseGeometry) -> str:
@@ -115,17 +158,20 @@ td{text-align:right;padding:1px 0 1px .6em;font-variant-numeric:tabular-nums}
 i{display:inline-block;width:1.2em;height:.5em;margin:0 .4em}
 svg path{fill:none;vector-effect:non-scaling-stroke}
 .operating{fill:#f4f7fa!important;stroke:#555;stroke-dasharray:6 4}.area{fill:#dcebf5!important;stroke:#5b7f99}
-.obstacle{fill:#8c8c8c!important;stroke:#444}svg path{fill-rule:evenodd}
+.obstacle{fill:#8c8c8c!important;stroke:#444}.crossed{stroke:#444;stroke-dasharray:2 3}svg path{fill-rule:evenodd}
 .survey{stroke-width:2}.transit{stroke-width:1;opacity:.7}
 .start{stroke-width:7;stroke-linecap:round}.now{stroke-width:12;stroke-linecap:round}
 .task{stroke:#b8860b;stroke-width:8;stroke-linecap:square}
+.hurt{stroke-width:8;stroke-linecap:square}.rim{stroke:#000;stroke-width:10}
+.lost{stroke:#000;stroke-width:14;stroke-linecap:round}
 #play{width:100%}output{font-variant-numeric:tabular-nums}
 </style></head><body>
 <svg id="map" xmlns="http://www.w3.org/2000/svg"><g>@SITE@</g>@ROUTES@</svg>
 <aside><h1>@TITLE@</h1><p>@LINE@</p>
 <label>time <output id="clock">0:00</output><input id="play" type="range" min="0" max="1000" value="0"></label>
 <p><output id="where">drag to pan, wheel to zoom, double click to see all</output><br><output id="scale"></output></p>
-<table><thead><tr><th>vehicle</th><td>km</td><td>time</td><td>Wh</td></tr></thead><tbody>@ROWS@</tbody></table></aside>
+<table><thead><tr><th>vehicle</th><td>km</td><td>time</td><td>Wh</td></tr></thead><tbody>@ROWS@</tbody></table>
+<p>@KEY@north is up; names appear under the pointer</p></aside>
 <script>
 "use strict";
 const facts = @FACTS@;

@@ -34,7 +34,7 @@ def figures(room: MultiPolygon, reach: float, robots: int) -> bytes:
         f"Fig. 1: trapezoids and {len(guards)} guards, range {reach:g} m",
         f"Fig. 2b: CDT, {len(net.cdt.edges)} edges",
         f"Fig. 2c: Reduced-CDT, {net.reduced.weight:.0f} m",
-        "Fig. 3: trees; orange: where Lemma 1 has no bridge",
+        "Fig. 3: trees; black: where Lemma 1 has no bridge",
         "Fig. 4d: constrained spanning tours",
         "Fig. 5: trees when robot 1 is lost",
     )
@@ -98,6 +98,6 @@ def _gaps(axis: Any, net: Any) -> None:
     owned = (net.forest.parents != ABSENT).any(axis=0)
     edges = net.reduced.edges
     loose = edges[~owned[edges].all(axis=1)]
-    axis.add_collection(LineCollection(net.cdt.points[loose], colors="#ff7f0e", linewidths=2.5, linestyles=":", zorder=5))
+    axis.add_collection(LineCollection(net.cdt.points[loose], colors="black", linewidths=2.5, linestyles=":", zorder=5))
     ends = np.unique(loose[~owned[loose]])
-    axis.plot(*net.cdt.points[ends].T, "s", color="#ff7f0e", markersize=6, markeredgecolor="black", zorder=6)
+    axis.plot(*net.cdt.points[ends].T, "s", color="black", markersize=5, zorder=6)

@@ -219,7 +219,7 @@ def _draw(folder: Path, seed: int, *, force: bool) -> None:
     from quarterdeck.geo.palette import colours
 
     for name, case in CASES.items():
-        figure = Figure(figsize=(13, 6.2), layout="tight")
+        figure = Figure(figsize=(13, 5.6), layout="tight")
         axes = figure.subplots(1, 2)
         for ax, objective in zip(axes, ("paper", "operator"), strict=True):
             mission = case_mission(name, seed, objective)
@@ -231,7 +231,7 @@ def _draw(folder: Path, seed: int, *, force: bool) -> None:
                 x, y = route.xyz[:, 0], route.xyz[:, 1]
                 order = "-".join(w.task for w in route.waypoints if w.task) or "stays"
                 ax.plot(x, y, color=colour, lw=2, label=f"{route.vehicle}: {order}, home at {route.duration:.0f} s")
-                ax.plot(x[0], y[0], "s", color=colour, ms=10)
+                ax.plot(x[0], y[0], "s", color=colour, ms=10, zorder=7)
                 for a, b in zip(route.xyz[:-1], route.xyz[1:], strict=True):
                     middle, step = (a + b) / 2, (b - a) * 0.01
                     if abs(step).max() > 0.01:

@@ -179,8 +179,8 @@ def draw() -> dict[str, bytes]:
         for ax, (outcome, words) in zip(figure.subplots(1, len(panels), squeeze=False).flat, panels, strict=True):
             draw_field(ax, outcome, ways=drawn)
             ax.set_title(f"{words}: {outcome.end:.0f} s", fontsize=9, loc="left")
-        longest = max((outcome for outcome, _ in panels), key=lambda outcome: outcome.end)
-        figure.legend(handles=field_legend(longest, [longest.end]), fontsize=8, loc="outside lower center", ncols=8)
+        first = panels[0][0]
+        figure.legend(handles=field_legend(first, [first.end]), fontsize=8, loc="outside lower center", ncols=8)
         return png(figure, dpi=110)
 
     others = [(case.run(m), m.replace("-", " ")) for m in ("no-priority", "no-relay", "constant")]

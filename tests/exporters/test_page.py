@@ -3,10 +3,12 @@
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 
 import pytest
 
 from quarterdeck.exporters.page import page
+from quarterdeck.geo.scenario import Casualty
 
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
@@ -18,6 +20,19 @@ def test_it_needs_no_network_and_no_name_is_markup(make_fleet):
     assert "<b>" not in text
     addresses = re.findall(r"(?:src|href|url\(|@import|fetch|https?:)[^\s>]*", text)
     assert set(addresses) <= {'http://www.w3.org/2000/svg"', "https:", "http:", "http://www.w3.org/2000/svg"}
+
+
+def test_the_legend_has_what_is_on_the_map(make_fleet):
+    """Casualties and who is lost are drawn and told where there are any, and an obstacle that may be crossed as such."""
+    plain = make_fleet(2)
+    signs = ("obstacle<br>", "not covered, may be crossed", "casualty: red", "lost<br>", "task<br>")
+    assert [sign in page(plain) for sign in signs] == [True, False, False, False, False]
+    low = tuple(replace(o, blocks=frozenset({"ground"})) for o in plain.site.obstacles)
+    changed = replace(plain, site=replace(plain.site, obstacles=low), lost=(replace(plain.vehicles[0], id="usv9"),))
+    text = page(replace(changed, casualties=(Casualty("c1", (5.0, 5.0), "red"),)))
+    assert [sign in text for sign in signs] == [False, True, True, True, False]
+    assert "usv9 lost" in text
+    assert "c1, red" in text
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium here: the page's script was not run")

@@ -1,16 +1,18 @@
 """The recording, as rerun's own tools read it."""
 
-import re
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from rerun.chunk import RrdReader
 from shapely import LineString, MultiPolygon, box
 
 from quarterdeck.exporters.recording import recording
+from quarterdeck.geo.palette import CASUALTY, SITE
 from quarterdeck.geo.scenario import Casualty
+from quarterdeck.mission.layers import fleet_colours
 from quarterdeck.mission.mission import Layer
 from quarterdeck.physics.moments import Moment
 
@@ -28,26 +30,34 @@ def test_rerun_verifies_it_and_finds_the_same_twice(boats, tmp_path):
         assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.skipif(not RERUN.exists(), reason="rerun's command is not installed")
-def test_it_has_what_the_picture_has(boats, tmp_path):
+def test_it_has_what_the_picture_has_in_the_same_colours(boats, tmp_path):
     """Tasks, casualties, layers and who was lost are in it, in both views; what is not there is not."""
-    area = box(0.0, 0.0, 9.0, 9.0)
+    area, first = box(0.0, 0.0, 9.0, 9.0), boats.vehicles[0].id
     mission = replace(
         boats,
         casualties=(Casualty("c1", (5.0, 5.0), "red"),),
-        layers=(Layer("region", (area, MultiPolygon([area])), ({"vehicle": boats.vehicles[0].id}, {})),),
+        layers=(Layer("region", (area, MultiPolygon([area])), ({"vehicle": first}, {})),),
         left_out=(LineString([(0, 0), (9, 9)]),),
     )
-    moments = (Moment(30.0, boats.vehicles[0].id, "lost", 1.0, 2.0),)
-    plain, rich = entities(recording(boats), tmp_path), entities(recording(mission, moments=moments), tmp_path)
-    more = {"casualties", "layers/region", r"layers/left\ out", f"lost/{boats.vehicles[0].id}/0"}
-    assert {f"{view}/{name}" for view in ("metres", "map") for name in more} | {"happened"} == rich - plain
-    assert {"metres/site/areas", "map/site/areas", f"metres/vehicles/{boats.vehicles[0].id}"} <= plain
+    moments = (Moment(30.0, first, "lost", 1.0, 2.0),)
+    plain, rich = colours_in(recording(boats), tmp_path), colours_in(recording(mission, moments=moments), tmp_path)
+    more = {"casualties", "layers/region", r"layers/left\ out", f"lost/{first}/0"}
+    assert {f"/{view}/{name}" for view in ("metres", "map") for name in more} | {"/happened"} == rich.keys() - plain.keys()
+    assert plain["/map/site/areas"] == {SITE["area"]}
+    for vehicle, colour in fleet_colours(boats).items():
+        assert plain[f"/metres/vehicles/{vehicle}"] == plain[f"/map/plan/{vehicle}"] == {colour}
+    assert rich[f"/map/lost/{first}/0"] == {fleet_colours(mission)[first]}
+    assert rich["/map/casualties"] == {CASUALTY["red"]}
 
 
-def entities(data, folder):
-    """Return the entities of a recording, as rerun prints them."""
+def colours_in(data, folder):
+    """Return the entities of a recording with their colours, as rerun reads them."""
     path = folder / "some.rrd"
     path.write_bytes(data)
-    done = subprocess.run([RERUN, "rrd", "print", path], capture_output=True, text=True, check=True)
-    return set(re.findall(r" - /((?:metres|map|happened)\S*(?:\\ \S+)*) - data columns", done.stdout))
+    found = {}
+    for chunk in RrdReader(path).stream():
+        batch = chunk.to_record_batch()
+        own = found.setdefault(str(chunk.entity_path), set())
+        for name in (n for n in batch.schema.names if n.endswith(":colors")):
+            own |= {f"#{rgba >> 8:06x}" for rgba in batch.column(name).to_pylist()[0]}
+    return found
