@@ -146,11 +146,21 @@ class Desk:
             self.mute -= {name}
 
     def stand(self, name: str, place: XY) -> XY:
-        """Return the place, or the nearest at which somebody on the ground may be."""
-        if self.ways(name) is straight:
+        """Return the place, or the nearest at which somebody on the ground may be, which a UAV keeps above."""
+        if self.ways(name) is straight and name not in self.team.uavs:
             return place
         near = nearest_points(self.team.ground if name in self.team.ugvs else self.team.foot, Point(place))[0]
         return float(near.x), float(near.y)
+
+    def middle(self, rendezvous: XY) -> XY:
+        """Return the middle of the robots that wait at a rendezvous."""
+        return rendezvous[0] + self.team.beside[0], rendezvous[1] + self.team.beside[1]
+
+    def berth(self, name: str, rendezvous: XY, far: float = 1.0) -> XY:
+        """Return a robot's place at a rendezvous, or what is `far` times as far from the middle."""
+        (x, y), (dx, dy) = self.middle(rendezvous), self.robots[name].berth
+        place = x + far * dx, y + far * dy
+        return place if place == rendezvous else self.stand(name, place)
 
     def ways(self, name: str) -> Ways:
         """Return the shortest paths of a member."""

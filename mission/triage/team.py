@@ -1,7 +1,7 @@
 """The team at work: what is fixed before the mission starts, made from a scenario and checked once."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from math import inf
 
@@ -14,6 +14,7 @@ from quarterdeck.geo.models import load_model
 from quarterdeck.geo.scenario import Scenario, Vehicle, as_multipolygon
 from quarterdeck.geo.transit import roadmap, shortest_path
 from quarterdeck.mission.mission import Waypoint
+from quarterdeck.mission.triage.berths import berths
 from quarterdeck.mission.triage.chase import Ways, straight
 from quarterdeck.mission.triage.records import XY, Stand
 from quarterdeck.mission.triage.search import Search, search_paths
@@ -23,17 +24,16 @@ from quarterdeck.mission.world import Actor, Target
 _MOVES = 30.0  # s between two places of a moving rendezvous
 _HALT = 1.0  # s
 _STANDOFF = 1.5  # m
-_ABOVE = 3.0  # m, at the most, that a UAV flies above the one before it: they hover at one rendezvous
-_APART = 4.2  # lengths between UGVs that wait side by side, so that one passes between two others
+_ABOVE = 3.0  # m, at the most, that a UAV flies above the one before it: they come and go at one rendezvous
 
 
 @dataclass(frozen=True, slots=True)
 class Robot:
     """A UGV or UAV, `vehicle`: `path` is what a UGV searches; `home` when a UAV hovers where, as (seconds, (x, y)).
 
-    What bodies add: `berth` is how far from the rendezvous a UGV waits, metres east and north; `standoff` how near it
-    drives to a casualty, metres; `halt` how many seconds a UAV that looks for somebody stops where it changes course, so
-    that it does not fly past him at speed.
+    What bodies add: `berth` is how far from the middle of those at a rendezvous it waits, metres east and north;
+    `standoff` how near a UGV drives to a casualty, metres; `halt` how many seconds a UAV that looks for somebody stops
+    where it changes course, so that it does not fly past him at speed.
     """
 
     id: str
@@ -61,7 +61,8 @@ class Team:
 
     `medics` are starts by id; `ground`, `foot` and `air` are where UGVs, medics and UAVs may be. `stand` is how far the
     mission had come before; `paces` are speeds of medics in m/s, where they are not the settings'. `depots` are where spare
-    devices for medics are, and where who has nobody to report to comes: the rendezvous or, without any, where medics start.
+    devices for medics are, and where who has nobody to report to comes: the rendezvous or, without any, where medics start;
+    `beside` is how far from a rendezvous the middle of the robots that wait there is, metres east and north.
     `distances` gives the medics' (n, n) metres between (n, 2) points; `on_ground`, `on_foot` and `in_air` shortest paths.
     """
 
@@ -79,6 +80,7 @@ class Team:
     distances: Callable[[np.ndarray], np.ndarray]
     stand: Stand | None = None
     paces: Mapping[str, float] = field(default_factory=dict)
+    beside: XY = (0.0, 0.0)
 
     @property
     def began(self) -> float:
@@ -116,10 +118,10 @@ def make_team(
 ) -> Team:
     """Return the team of a scenario for a method; `search` gives the UGVs other paths than their tours.
 
-    With `bodies` nobody is a point: medics keep clear of walls, UGVs wait side by side around the rendezvous, UAVs one
-    above the other. From a `stand` the mission goes on, with the search that belongs to it: what was checked at its
-    beginning is so no more. Raises InputError, in one line, if there is no UGV or medic, no UAV for a method that needs
-    one, or a casualty, medic or rendezvous is where nobody can get.
+    With `bodies` nobody is a point: medics keep clear of walls, robots wait side by side beside the rendezvous. From a
+    `stand` the mission goes on, with the search that belongs to it: what was checked at its beginning is so no more. Raises
+    InputError, in one line, if there is no UGV or medic, no UAV for a method that needs one, or a casualty, medic or
+    rendezvous is where nobody can get.
     """
     if method not in METHODS:
         raise InputError(f"unknown method {method!r}; use one of {', '.join(METHODS)}")
@@ -152,10 +154,9 @@ def make_team(
         points = stand.depots if stand else _rendezvous(scenario, search)
     routes = [tuple(Waypoint(float(x), float(y), leg="survey", speed=u.speed) for x, y in p)
               for u, p in zip(ugvs, search.paths, strict=True)]  # fmt: skip
-    berths = _berths(ugvs, search.paths, points) if bodies else [(0.0, 0.0)] * len(ugvs)
     robots = {
-        u.id: Robot(u.id, u, u.start, u.speed, s, path=r, berth=b, standoff=_STANDOFF * bodies)
-        for u, s, r, b in zip(ugvs, sees, routes, berths, strict=True)
+        u.id: Robot(u.id, u, u.start, u.speed, s, path=r, standoff=_STANDOFF * bodies)
+        for u, s, r in zip(ugvs, sees, routes, strict=True)
     }
     homes: list[tuple[tuple[float, XY], ...]] = [((0.0, p),) for p in _in_turn(points, len(uavs))]
     if settings.rendezvous == "moving" and points:
@@ -165,12 +166,20 @@ def make_team(
     used = uavs if policy.receiver == "uav" else []
     room = min((u.ceiling - u.altitude for u in used), default=0.0) / max(len(used), 1)
     step = min(_ABOVE, max(room, 0.0)) * bodies
+    flyers = {
+        u.id: Robot(u.id, u, u.start, u.speed, 0.0, u.altitude + i * step, home=h, halt=_HALT * bodies)
+        for i, (u, h) in enumerate(zip(used, homes, strict=True))
+    }
+    beside = (0.0, 0.0)
+    if bodies and used:
+        beside, *waiting = berths(scenario.site, ground, ugvs, search.paths, used, homes, settings.talk)
+        robots, flyers = (
+            {r.id: replace(r, berth=b) for r, b in zip(kind.values(), places, strict=True)}
+            for kind, places in zip((robots, flyers), waiting, strict=True)
+        )
     return Team(
         ugvs=robots,
-        uavs={
-            u.id: Robot(u.id, u, u.start, u.speed, 0.0, u.altitude + i * step, home=h, halt=_HALT * bodies)
-            for i, (u, h) in enumerate(zip(used, homes, strict=True))
-        },
+        uavs=flyers,
         medics=dict(scenario.medics),
         search=search,
         depots=tuple(points) or tuple(xy for _, xy in scenario.medics),
@@ -182,6 +191,7 @@ def make_team(
         in_air=ways_in(air),
         distances=_distances(on_foot),
         stand=stand,
+        beside=beside,
     )
 
 
@@ -283,19 +293,6 @@ def _rendezvous(scenario: Scenario, search: Search) -> tuple[XY, ...]:
     free = scenario.site.navigable("ground")
     near = centre if free.covers(centre) else free.boundary.interpolate(free.boundary.project(centre))
     return ((near.x, near.y),)
-
-
-def _berths(ugvs: Sequence[Vehicle], paths: Sequence[np.ndarray], rendezvous: Sequence[XY]) -> list[XY]:
-    """Return where each UGV waits, from the rendezvous: on a circle, `_APART` lengths from the next, near its section."""
-    if len(ugvs) < 2 or not rendezvous:
-        return [(0.0, 0.0)] * len(ugvs)
-    radius = _APART * max(u.model.length for u in ugvs) / (2 * np.sin(np.pi / len(ugvs)))
-    away = np.array([p.mean(axis=0) for p in paths]) - rendezvous[0]
-    wanted = np.arctan2(away[:, 1], away[:, 0])
-    even = np.empty(len(ugvs))
-    even[np.argsort(wanted, kind="stable")] = 2 * np.pi * np.arange(len(ugvs)) / len(ugvs)
-    angles = even + np.angle(np.exp(1j * (wanted - even)).mean())
-    return [(float(radius * np.cos(a)), float(radius * np.sin(a))) for a in angles]
 
 
 def _moving(ugvs: Mapping[str, Robot], free: MultiPolygon) -> tuple[tuple[float, XY], ...]:

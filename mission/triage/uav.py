@@ -97,6 +97,7 @@ def go_home(desk: Desk, name: str) -> None:
     stay = [p for i, p in enumerate(robot.home) if i + 1 == len(robot.home) or robot.home[i + 1][0] > desk.time]
     waypoints, at = [], desk.here(name)
     for from_time, place in stay:
+        place = desk.berth(name, place)
         corners = desk.team.in_air(at, place)
         waypoints += [Waypoint(x, y, robot.z, speed=robot.speed, time=from_time) for x, y in corners]
         at = place
@@ -135,7 +136,7 @@ def way_home(desk: Desk, name: str) -> list[XY]:
 
 
 def _hover(desk: Desk, name: str) -> None:
-    """Stay; in a round robin, go on to the next UGV: if one should have been here, it was not."""
+    """Keep to the place; in a round robin, go on to the next UGV: if one should have been here, it was not."""
     me: Uav = desk.agents[name]
     if me.target:
         misses = dict(me.misses or {})
@@ -144,7 +145,7 @@ def _hover(desk: Desk, name: str) -> None:
     if desk.settings.rendezvous == "round-robin" and _next_ugv(desk, name):
         go_home(desk, name)
     else:
-        desk.send(name, ())
+        desk.change(name, moving=False)
 
 
 def _next_ugv(desk: Desk, name: str) -> str:

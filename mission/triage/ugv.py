@@ -13,7 +13,7 @@ from quarterdeck.mission.triage.desk import Desk
 from quarterdeck.mission.triage.records import XY, Report, Section, Uav, Ugv
 
 _REPORTING = ("deliver", "wait", "seek")
-_OUTSIDE = 3.0  # times as far from the rendezvous as its place there
+_OUTSIDE = 3.0  # times as far from the middle of a rendezvous as its place there
 _DRIFT = 0.4  # m that a UAV with a body may hover off its place: who waits on the edge of its range is not heard
 
 
@@ -209,7 +209,7 @@ def stand_by(desk: Desk, name: str) -> None:
     soon = min(due(desk, s, me.board) for s in me.board)
     meeting = desk.policy.receiver == "uav" or desk.policy.everywhere  # elsewhere it will hear of nobody: a medic calls it
     hears = desk.reach - _DRIFT * (desk.team.ugvs[name].standoff > 0)
-    near = min(_length([here, d]) for d in desk.team.depots) <= hears
+    near = min(_length([here, desk.middle(d)]) for d in desk.team.depots) <= hears
     hold = soon - desk.time if meeting and soon < inf else 0.0
     if (near and hold <= 0) or not ((meeting and soon < inf) or me.reports):
         desk.send(name, ())
@@ -314,11 +314,9 @@ def _to_rendezvous(desk: Desk, name: str) -> list[XY]:
 
 def _berth(desk: Desk, name: str, rendezvous: XY) -> list[XY]:
     """Return the way into its own place at a rendezvous: straight from outside, so that nobody who waits is in the way."""
-    dx, dy = desk.team.ugvs[name].berth
-    if not dx and not dy:
+    if desk.team.ugvs[name].berth == (0.0, 0.0):
         return [rendezvous]
-    x, y = rendezvous
-    return [desk.stand(name, (x + far * dx, y + far * dy)) for far in (_OUTSIDE, 1.0)]
+    return [desk.berth(name, rendezvous, far) for far in (_OUTSIDE, 1.0)]
 
 
 def _wait(desk: Desk, name: str) -> None:

@@ -154,6 +154,21 @@ def test_the_sample_drill_is_driven_to_its_end(faults: tuple[str, ...]) -> None:
     assert run.trace.time[-1] < 1000.0
 
 
+def test_a_uav_that_fails_where_it_hovers_falls_on_nobody() -> None:
+    """Two UAVs hover at the rendezvous, where a medic stands: each comes down, and touches no one."""
+    from quarterdeck.physics.simulate import simulate
+
+    site = generate(paper_team(ugvs=1, uavs=2, size=(24.0, 16.0)), 1, casualties=(1, 1))
+    starts = {"uav1": (6.0, 12.0), "uav2": (18.0, 12.0)}
+    site = replace(site, vehicles=tuple(replace(v, start=starts.get(v.id, v.start)) for v in site.vehicles))
+    away = Casualty("c1", (23.0, 15.0), "green")
+    mission = plan_triage(replace(site, casualties=(away,), rendezvous=(("r", (12.0, 8.0)),)))
+    run = simulate(mission, faults=("uav2@14", "uav1@16"), duration=20.0)
+    assert [round(float(z), 1) for z in run.trace.z[-1]] == [0.0] * 4
+    assert not run.trace.contact[:, [run.trace.vehicles.index(v) for v in ("medic1", "ugv1")]].any()
+    assert run.report.figures["separation"] > 0.0
+
+
 def test_rough_ground_is_climbed_and_seen_over(tmp_path) -> None:  # type: ignore[no-untyped-def]
     """On hills of 1.5 m all are found and treated; UGVs and medic stand on the ground, and it takes them more energy."""
     from quarterdeck.physics.simulate import simulate
