@@ -19,7 +19,7 @@ from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.recovery import asked_for
 from quarterdeck.mission.recovery_memory import followed, left_out, relieved, tellings, undone
 from quarterdeck.mission.served import served_tasks
-from quarterdeck.mission.told import as_told
+from quarterdeck.mission.told import Telling, as_told
 from quarterdeck.mission.triage.plan import METHOD, run_plan
 from quarterdeck.physics.faults import in_fast_world, read_faults
 from quarterdeck.physics.mapping import agreement
@@ -114,30 +114,10 @@ def simulate(
     there = known.obstacles if sensing.world is None else sensing.world
     plan, mission = mission, replace(mission, site=replace(known, obstacles=(*there, *sensing.unmapped)))
     turns = turns_of(mission.site, changes)
-    cut = ""
     with open_world(step) as world:
         air = Wind(np.array([*wind, 0.0]), gusts, len(ids), seed)
         run = Running(mission, director, world, seed, np.array(current), air, befalling, sensing, known, terrain, turns)
-        builder = TraceBuilder(tuple(v.id for v in mission.vehicles))
-        every = max(1, round((sample or step) / step))
-        run.decide()
-        run.record(builder)
-        count = 0
-        while not run.done and run.time < until - step / 2:
-            if time_is_up("the run"):
-                cut = f"the run was stopped at {run.time:,.0f} s of the mission ({cause()})"
-                run.record(builder)
-                break
-            run.advance()
-            count += 1
-            run.time = count * step
-            if count % round(DECIDE / step) == 0:
-                run.decide()
-                if progress is not None:
-                    progress(run.time, min(max(planned, run.time), until))
-            if count % every == 0 or run.done:
-                run.record(builder)
-    trace = builder.trace()
+        trace, cut = _drive(run, until, sample, planned, progress)
     compared = None
     if aside is not None:
         late = cut or ("" if run.done else f"the mission was not over after {until:,.0f} s")
@@ -152,20 +132,10 @@ def simulate(
         "wind": list(wind),
         "gusts": gusts,
         "faults": [str(f) for f in befalling],
-        "gnss": sensing.gnss,
-        "lidar": sensing.lidar or sensing.amcl,
-        "amcl": sensing.amcl,
-        "field": sensing.field,
-        "terrain": None if terrain is None else [*terrain.origin, terrain.cell, *terrain.heights.shape],
-        "mapping": sensing.mapping,
-        "unmapped": [o.id for o in sensing.unmapped],
-        "world": None if sensing.world is None else [o.id for o in sensing.world],
+        **_sensed(sensing, terrain),
     }
-    dead = {v for v, alive in zip(ids, run.status.alive.tolist(), strict=True) if not alive}
-    reliefs = [relief for v, relief in relieved(run.memory).items() if v in dead]
-    heeded = [wish for when, wish in changes if when <= run.time]
-    orders = tellings(run.memory)
-    told = as_told(asked_for(plan, heeded), orders, reliefs) if heeded or orders or reliefs else plan
+    reliefs = _reliefs(run)
+    told = _told(plan, run, [wish for when, wish in changes if when <= run.time], reliefs)
     served, servers = run.link.served, run.link.servers
     if told is not plan and plan.method == "guards":  # each plan numbers its guards anew
         found = served_tasks(told, trace.tracks())
@@ -196,10 +166,70 @@ def simulate(
     if sensing.mapping and run.router is not None:
         made = replace(run.router.findings.shared.occupancy(), place=(mission.frame.lon, mission.frame.lat))
         report = replace(report, figures={**report.figures, **agreement(made, mission.site)})
-    anew = [(t.time, t.route.vehicle) for t in tellings(run.memory)]
-    anew += [(e.time, e.who) for e in compared.driven.log if e.what == "takes over"] if compared else []
-    happened = moments(trace, run.status.gone, run.status.lost, anew)
+    happened = moments(trace, run.status.gone, run.status.lost, _orders(run, compared))
     return Run(trace, report, compared, left, made, told, followed(run.memory), happened)
+
+
+def _drive(
+    run: Running,
+    until: float,
+    sample: float | None,
+    planned: float,
+    progress: Callable[[float, float], None] | None,
+) -> tuple[Trace, str]:
+    """Let the run go on until all is done or it is `until` seconds; return its trace, and why it was cut short or ""."""
+    step, cut, count = run.world.step, "", 0
+    builder = TraceBuilder(tuple(run.ids))
+    every = max(1, round((sample or step) / step))
+    run.decide()
+    run.record(builder)
+    while not run.done and run.time < until - step / 2:
+        if time_is_up("the run"):
+            cut = f"the run was stopped at {run.time:,.0f} s of the mission ({cause()})"
+            run.record(builder)
+            break
+        run.advance()
+        count += 1
+        run.time = count * step
+        if count % round(DECIDE / step) == 0:
+            run.decide()
+            if progress is not None:
+                progress(run.time, min(max(planned, run.time), until))
+        if count % every == 0 or run.done:
+            run.record(builder)
+    return builder.trace(), cut
+
+
+def _sensed(sensing: Sensing, terrain: Terrain | None) -> dict[str, Any]:
+    """Return what was sensed and what there was to sense, as the report's settings tell it."""
+    return {
+        "gnss": sensing.gnss,
+        "lidar": sensing.lidar or sensing.amcl,
+        "amcl": sensing.amcl,
+        "field": sensing.field,
+        "terrain": None if terrain is None else [*terrain.origin, terrain.cell, *terrain.heights.shape],
+        "mapping": sensing.mapping,
+        "unmapped": [o.id for o in sensing.unmapped],
+        "world": None if sensing.world is None else [o.id for o in sensing.world],
+    }
+
+
+def _reliefs(run: Running) -> list[Telling]:
+    """Return how far those had come who are dead and whose part was given to others."""
+    dead = {v for v, alive in zip(run.ids, run.status.alive.tolist(), strict=True) if not alive}
+    return [relief for v, relief in relieved(run.memory).items() if v in dead]
+
+
+def _told(plan: Mission, run: Running, heeded: Sequence[Changes], reliefs: Sequence[Telling]) -> Mission:
+    """Return the plan as its vehicles were told it, of what was asked for in the end."""
+    orders = tellings(run.memory)
+    return as_told(asked_for(plan, heeded), orders, reliefs) if heeded or orders or reliefs else plan
+
+
+def _orders(run: Running, compared: Compared | None) -> list[tuple[float, str]]:
+    """Return when vehicles were told new routes, or took over others' parts: seconds and vehicles."""
+    took_over = [(e.time, e.who) for e in compared.driven.log if e.what == "takes over"] if compared else []
+    return [(t.time, t.route.vehicle) for t in tellings(run.memory)] + took_over
 
 
 def _check(
