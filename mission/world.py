@@ -4,20 +4,19 @@ It asks a director as PyBullet does (see `director`), but sightings, meetings an
 thousands of missions a minute can be studied.
 """
 
-from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import inf
 from typing import Any, Literal
 
 import numpy as np
 
 from quarterdeck.geo.deadline import cause, time_is_up
-from quarterdeck.mission.courses import at, crossing, sightings
+from quarterdeck.mission.courses import crossing, sightings
 from quarterdeck.mission.director import Command, Director, Event, State, wake_time
 from quarterdeck.mission.mission import Waypoint
+from quarterdeck.mission.motion import SAME, Motion
 
-SAME = 1e-9  # s: events this close are one moment
 EDGE = 1e-6  # m: contact is lost this far beyond the range, so that a range just reached is not lost by rounding
 MOST_TIME = 7 * 86400.0  # s
 _MOST_CALLS = 10_000  # at one moment: a director that commands for ever without time passing is wrong
@@ -102,68 +101,17 @@ def run_world(
     waypoint's task, after its hold), `lost` (data `kind`) and, of who was silent, `returned`. The director is called at
     each, whenever somebody has become idle, and when it wants to be.
     """
-    ids = [a.id for a in actors]
-    index = {name: i for i, name in enumerate(ids)}
-    n = len(actors)
-    spots = np.array([(s.x, s.y) for s in targets], dtype=float).reshape(-1, 2)
-    partners: list[list[tuple[int, int]]] = [[] for _ in actors]
-    for k, (i, j) in enumerate(pairs):
-        partners[i].append((k, j))
-        partners[j].append((k, i))
-    plans = [_Plan(0.0, a.x, a.y, a, ()) for a in actors]
-    tracks: list[list[np.ndarray]] = [[] for _ in actors]
-    unseen = np.ones((n, len(targets)), dtype=bool)
-    sight = np.full((n, len(targets)), inf)
-    contact = [False] * len(pairs)
-    switch = [inf] * len(pairs)
-    alive = [True] * n
-    pace = [1.0] * n
-    over = {"mute": "heard", "slow": "slow"}
-    changes: list[tuple[float, str, str, float]] = [(f.time, f.actor, f.kind, f.pace) for f in faults]
-    changes += [(f.until, f.actor, over[f.kind], 1.0 / f.pace) for f in faults if f.until < inf and f.kind in over]
-    pending = sorted(changes)
+    world = _World(actors, targets, pairs, reach, faults)
     log: list[tuple[float, Event]] = []
-
-    def look_ahead(i: int, now: float) -> None:
-        """Work out afresh what actor i will see and meet on its present course."""
-        if actors[i].sees > 0 and alive[i] and len(targets):
-            sight[i] = np.where(unseen[i], sightings(plans[i].knots, spots, actors[i].sees, now), inf)
-        else:
-            sight[i] = inf
-        for k, j in partners[i]:
-            if not (alive[i] and alive[j]):
-                switch[k] = inf
-            elif contact[k]:
-                switch[k] = crossing(plans[i].knots, plans[j].knots, reach + EDGE, now, False)
-            else:
-                switch[k] = crossing(plans[i].knots, plans[j].knots, reach, now, True)
-
-    for i in range(n):
-        look_ahead(i, 0.0)
     events: list[Event] = []
     now, memory, calls = 0.0, None, 0
     while True:
-        states = {ids[i]: _state(plans[i], actors[i].z, now, alive[i]) for i in range(n)}
-        for plan in plans:
-            plan.told = plan.end <= now + SAME
+        states = world.states(now)
+        for motion in world.motions:
+            motion.told = motion.end <= now + SAME
         commands, memory = director(now, states, tuple(events), memory)
-        for name, command in commands.items():
-            i = index[name]
-            if alive[i]:
-                here = states[name]
-                tracks[i].append(_until(plans[i].knots, now))
-                plans[i] = _Plan(now, here.x, here.y, actors[i], command, here.energy_used)
-                plans[i].change_pace(now, pace[i])
-        for name in commands:
-            look_ahead(index[name], now)
-
-        then = min(
-            min((p.next_stop() for p in plans), default=inf),
-            float(sight.min()) if sight.size else inf,
-            min(switch, default=inf),
-            pending[0][0] if pending else inf,
-            max(wake_time(memory), now),
-        )
+        world.obey(now, commands, states)
+        then = min(world.next_moment(), max(wake_time(memory), now))
         if then == inf or then > until:
             reason = "" if then == inf else f"the mission was not over after {until:g} s"
             break
@@ -173,132 +121,146 @@ def run_world(
         calls = calls + 1 if then <= now + SAME else 0
         if calls > _MOST_CALLS:
             raise RuntimeError(f"the director does not let time pass at {now:.3f} s")
-        now, events = max(then, now), []
-        while pending and pending[0][0] <= now + SAME:
-            _, name, kind, times = pending.pop(0)
-            i = index[name]
-            if not alive[i]:
-                continue
-            if kind == "slow":
-                pace[i] *= times
-                plans[i].change_pace(now, times)
-                look_ahead(i, now)
-                continue
-            if kind == "stop":
-                here = _state(plans[i], 0.0, now, True)
-                tracks[i].append(_until(plans[i].knots, now))
-                plans[i] = _Plan(now, here.x, here.y, actors[i], (), here.energy_used)
-                plans[i].told = True
-                alive[i] = False
-                look_ahead(i, now)
-            events.append(Event("returned", name) if kind == "heard" else Event("lost", name, data={"kind": kind}))
-        for i, plan in enumerate(plans):
-            events += [Event("served", ids[i], task) for task in plan.tasks_until(now)]
-        for i, k in zip(*np.nonzero(sight <= now + SAME), strict=True):
-            unseen[i, k], sight[i, k] = False, inf
-            target = targets[k]
-            events.append(Event("seen", ids[i], target.id, {"x": target.x, "y": target.y, **target.data}))
-        for k, (i, j) in enumerate(pairs):
-            if switch[k] <= now + SAME:
-                contact[k] = not contact[k]
-                if contact[k]:
-                    events.append(Event("met", ids[i], ids[j]))
-                knots = plans[i].knots, plans[j].knots
-                switch[k] = crossing(*knots, reach + EDGE if contact[k] else reach, now, not contact[k])
+        now = max(then, now)
+        events = [*world.befall(now), *world.serve(now), *world.see(now), *world.meet(now)]
         log += [(now, e) for e in events]
     last = until if until < inf else now
-    states = {ids[i]: _state(plans[i], actors[i].z, last, alive[i]) for i in range(n)}
-    left = {ids[i]: plan.left(last) for i, plan in enumerate(plans)}
-    for i, plan in enumerate(plans):
-        tracks[i].append(plan.knots if reason == "" else _until(plan.knots, until))
-    ways = {ids[i]: _joined(tracks[i]) for i in range(n)}
-    return Run(ways, tuple(log), until if reason else now, memory, reason, states, left)
+    left = {a.id: motion.left(last) for a, motion in zip(actors, world.motions, strict=True)}
+    ways = world.ways(until if reason else inf)
+    return Run(ways, tuple(log), until if reason else now, memory, reason, world.states(last), left)
 
 
-class _Plan:
-    """One actor's course from its last command: `knots` (m, 3) seconds, x, y; `served` the times its waypoints are over.
+class _World:
+    """All actors of a run: their `motions`, what each has yet to see, who is in contact, and when that is to change."""
 
-    `used` watt-hours before it, of an actor whose energy is reckoned.
-    """
+    def __init__(
+        self,
+        actors: Sequence[Actor],
+        targets: Sequence[Target],
+        pairs: Sequence[tuple[int, int]],
+        reach: float,
+        faults: Sequence[Fault],
+    ) -> None:
+        n = len(actors)
+        self.actors, self.targets, self.pairs, self.reach = actors, targets, pairs, reach
+        self.index = {a.id: i for i, a in enumerate(actors)}
+        self.spots = np.array([(s.x, s.y) for s in targets], dtype=float).reshape(-1, 2)
+        self.partners: list[list[tuple[int, int]]] = [[] for _ in actors]
+        for k, (i, j) in enumerate(pairs):
+            self.partners[i].append((k, j))
+            self.partners[j].append((k, i))
+        self.motions = [Motion(0.0, a.x, a.y, a.speed, a.power) for a in actors]
+        self.tracks: list[list[np.ndarray]] = [[] for _ in actors]
+        self.unseen = np.ones((n, len(targets)), dtype=bool)
+        self.sight = np.full((n, len(targets)), inf)
+        self.contact, self.switch = [False] * len(pairs), [inf] * len(pairs)
+        self.alive, self.pace = [True] * n, [1.0] * n
+        over = {"mute": "heard", "slow": "slow"}
+        changes: list[tuple[float, str, str, float]] = [(f.time, f.actor, f.kind, f.pace) for f in faults]
+        changes += [(f.until, f.actor, over[f.kind], 1.0 / f.pace) for f in faults if f.until < inf and f.kind in over]
+        self.pending = sorted(changes)
+        for i in range(n):
+            self._look_ahead(i, 0.0)
 
-    __slots__ = ("end", "knots", "power", "served", "tasks", "told", "used", "waypoints")
+    def _look_ahead(self, i: int, now: float) -> None:
+        """Work out afresh what actor i will see and meet on its present course."""
+        knots = self.motions[i].knots
+        if self.actors[i].sees > 0 and self.alive[i] and len(self.targets):
+            self.sight[i] = np.where(self.unseen[i], sightings(knots, self.spots, self.actors[i].sees, now), inf)
+        else:
+            self.sight[i] = inf
+        for k, j in self.partners[i]:
+            if self.alive[i] and self.alive[j]:
+                self.switch[k] = self._crossing(k, i, j, now)
+            else:
+                self.switch[k] = inf
 
-    def __init__(self, time: float, x: float, y: float, actor: Actor, command: Command | tuple, used: float = 0.0) -> None:
-        speed, self.power, self.used = actor.speed, actor.power, used
-        knots, self.served, self.tasks = [(time, x, y)], [], []
-        self.waypoints = command.waypoints if isinstance(command, Command) else ()
-        for w in self.waypoints:
-            if w.time > time:
-                time = w.time
-                knots.append((time, x, y))
-            time += ((w.x - x) ** 2 + (w.y - y) ** 2) ** 0.5 / (w.speed or speed)
-            x, y = w.x, w.y
-            knots.append((time, x, y))
-            if w.hold > 0:
-                time += w.hold
-                knots.append((time, x, y))
-            self.served.append(time)
-            if w.task is not None:
-                self.tasks.append((time, w.task))
-        self.knots = np.array(knots)
-        self.end = time
-        self.told = not self.served  # the director knows that it is idle
+    def _crossing(self, k: int, i: int, j: int, now: float) -> float:
+        """Return when the pair `k` of actors i and j next comes into contact, or loses it."""
+        knots = self.motions[i].knots, self.motions[j].knots
+        return crossing(*knots, self.reach + EDGE if self.contact[k] else self.reach, now, not self.contact[k])
 
-    def change_pace(self, now: float, times: float) -> None:
-        """Move from now on at so many times the speed; what is waited for takes as long as it does."""
-        if times == 1.0:
-            return
-        before = self.knots[:, 0].copy()
-        moves = np.abs(np.diff(self.knots[:, 1:], axis=0)).max(axis=1, initial=0.0) > 0
-        ahead = np.clip(before[1:] - np.maximum(before[:-1], now), 0.0, None)
-        self.knots[1:, 0] += np.cumsum(np.where(moves, ahead * (1.0 / times - 1.0), 0.0))
-        self.served = np.interp(self.served, before, self.knots[:, 0]).tolist()
-        self.tasks = [(float(np.interp(when, before, self.knots[:, 0])), task) for when, task in self.tasks]
-        self.end = float(np.interp(self.end, before, self.knots[:, 0]))
+    def states(self, now: float) -> dict[str, State]:
+        """Return how everybody stands."""
+        everybody = zip(self.actors, self.motions, self.alive, strict=True)
+        return {a.id: motion.state(a.z, now, alive) for a, motion, alive in everybody}
 
-    def next_stop(self) -> float:
-        """Return when a task of it is over or, if the director does not know yet, all of it; infinity if never."""
-        done = inf if self.told else self.end
-        return min(done, self.tasks[0][0]) if self.tasks else done
+    def obey(self, now: float, commands: Mapping[str, Command], states: Mapping[str, State]) -> None:
+        """Let those who can do what they are told."""
+        for name, command in commands.items():
+            i = self.index[name]
+            if self.alive[i]:
+                self._turn(i, now, states[name], command.waypoints)
+                self.motions[i].change_pace(now, self.pace[i])
+        for name in commands:
+            self._look_ahead(self.index[name], now)
 
-    def energy(self, now: float) -> float:
-        """Return the watt-hours used until now."""
-        if self.power is None:
-            return 0.0
-        time, x, y = self.knots[: int(np.searchsorted(self.knots[:, 0], now)) + 1].T
-        step = np.diff(time)
-        speed = np.hypot(np.diff(x), np.diff(y)) / np.where(step > 0, step, 1.0)
-        spent = np.diff(np.minimum(time, now)) @ self.power(speed)
-        return self.used + float(spent + self.power(np.zeros(1))[0] * max(now - self.end, 0.0)) / 3600.0
+    def _turn(self, i: int, now: float, here: State, waypoints: tuple[Waypoint, ...]) -> None:
+        """Let actor i begin another course, from where it is."""
+        actor = self.actors[i]
+        self.tracks[i].append(self.motions[i].until(now))
+        self.motions[i] = Motion(now, here.x, here.y, actor.speed, actor.power, waypoints, here.energy_used)
 
-    def left(self, now: float) -> tuple[Waypoint, ...]:
-        """Return the waypoints that are not over, of the first the hold that is left."""
-        reached = bisect_right(self.served, now + SAME)
-        rest = self.waypoints[reached:]
-        if rest and rest[0].hold > self.served[reached] - now:
-            rest = (replace(rest[0], hold=self.served[reached] - now), *rest[1:])
-        return rest
+    def next_moment(self) -> float:
+        """Return when something next happens by itself; infinity for never."""
+        return min(
+            min((m.next_stop() for m in self.motions), default=inf),
+            float(self.sight.min()) if self.sight.size else inf,
+            min(self.switch, default=inf),
+            self.pending[0][0] if self.pending else inf,
+        )
 
-    def tasks_until(self, now: float) -> list[str]:
-        """Take out and return the tasks that are over."""
-        if not self.tasks or self.tasks[0][0] > now + SAME:
-            return []
-        over = [task for time, task in self.tasks if time <= now + SAME]
-        self.tasks = self.tasks[len(over) :]
-        return over
+    def befall(self, now: float) -> list[Event]:
+        """Let faults begin and end whose time it is, and return what is heard of that."""
+        events = []
+        while self.pending and self.pending[0][0] <= now + SAME:
+            _, name, kind, times = self.pending.pop(0)
+            i = self.index[name]
+            if not self.alive[i]:
+                continue
+            if kind == "slow":
+                self.pace[i] *= times
+                self.motions[i].change_pace(now, times)
+                self._look_ahead(i, now)
+                continue
+            if kind == "stop":
+                self._turn(i, now, self.motions[i].state(0.0, now, True), ())
+                self.motions[i].told = True
+                self.alive[i] = False
+                self._look_ahead(i, now)
+            events.append(Event("returned", name) if kind == "heard" else Event("lost", name, data={"kind": kind}))
+        return events
 
+    def serve(self, now: float) -> list[Event]:
+        """Return what is served now."""
+        everybody = zip(self.actors, self.motions, strict=True)
+        return [Event("served", a.id, task) for a, motion in everybody for task in motion.tasks_until(now)]
 
-def _state(plan: _Plan, z: float, now: float, alive: bool) -> State:
-    x, y, heading = at(plan.knots, now)
-    served = plan.served
-    reached = len(served) if plan.end <= now + SAME else bisect_right(served, now + SAME)
-    return State(x, y, z, heading, alive, reached, reached == len(served), plan.energy(now))
+    def see(self, now: float) -> list[Event]:
+        """Return who comes to see what."""
+        events = []
+        for i, k in zip(*np.nonzero(self.sight <= now + SAME), strict=True):
+            self.unseen[i, k], self.sight[i, k] = False, inf
+            target = self.targets[k]
+            events.append(Event("seen", self.actors[i].id, target.id, {"x": target.x, "y": target.y, **target.data}))
+        return events
 
+    def meet(self, now: float) -> list[Event]:
+        """Return who comes into contact; others lose it."""
+        events = []
+        for k, (i, j) in enumerate(self.pairs):
+            if self.switch[k] <= now + SAME:
+                self.contact[k] = not self.contact[k]
+                if self.contact[k]:
+                    events.append(Event("met", self.actors[i].id, self.actors[j].id))
+                self.switch[k] = self._crossing(k, i, j, now)
+        return events
 
-def _until(knots: np.ndarray, now: float) -> np.ndarray:
-    """Return the knots before `now`, and where the actor is then."""
-    x, y, _ = at(knots, now)
-    return np.vstack([knots[knots[:, 0] < now], (now, x, y)])
+    def ways(self, until: float) -> dict[str, np.ndarray]:
+        """Return the tracks (n, 3) of all, to the end of their courses or `until` then."""
+        for track, motion in zip(self.tracks, self.motions, strict=True):
+            track.append(motion.knots if until == inf else motion.until(until))
+        return {a.id: _joined(track) for a, track in zip(self.actors, self.tracks, strict=True)}
 
 
 def _joined(pieces: list[np.ndarray]) -> np.ndarray:
