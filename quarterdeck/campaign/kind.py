@@ -5,6 +5,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+BETWEEN = " | "  # between the reasons in a row: one may well have semicolons of its own
+
 
 class Case(Protocol):
     """One run of a study; it travels to the process that runs it. `levels` are the conditions that the study varies."""
@@ -25,7 +27,7 @@ class Case(Protocol):
         """Return the case as columns of a table."""
 
     def run(self, text: str, limits: dict[str, float]) -> dict[str, Any]:
-        """Return `passed`, `reasons` and the figures of the run of the plan or site in `text`."""
+        """Return `passed`, `reasons`, BETWEEN them, and the figures of the run of the plan or site in `text`."""
 
     def replay(self, source: str, limits: Mapping[str, float]) -> str:
         """Return the command that runs the case again; `source` is the path of what is run."""

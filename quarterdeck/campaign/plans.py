@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from typing import Any
 
-from quarterdeck.campaign.kind import Kind, is_number
+from quarterdeck.campaign.kind import BETWEEN, Kind, is_number
 from quarterdeck.geo.errors import InputError
 from quarterdeck.mission.mission import Mission
 from quarterdeck.physics.positioning import GNSS
@@ -70,7 +70,7 @@ class PlanCase:
             ).report
         return {
             "passed": report.passed,
-            "reasons": "; ".join(report.reasons),
+            "reasons": BETWEEN.join(report.reasons),
             **report.figures,
             "trace_hash": report.trace_hash,
         }

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from quarterdeck.campaign.kind import Case
+from quarterdeck.campaign.kind import BETWEEN, Case
 from quarterdeck.campaign.study import Study
 from quarterdeck.geo.version import VERSION
 
@@ -74,7 +74,7 @@ def summarise(study: Study, cases: Sequence[Case], rows: Mapping[int, Mapping[st
         ]
         if study.levels
         else [],
-        "reasons": dict(Counter(kind for row in done for kind in sorted(_kinds(row))).most_common()),
+        "reasons": dict(Counter(kind for row in done for kind in sorted(kinds(row))).most_common()),
         "means": _means(done, names),
         "figures": {name: spread for name in names if (spread := _spread(done, name))},
         "worst": [
@@ -99,7 +99,7 @@ def badness(row: Mapping[str, Any]) -> tuple[Any, ...]:
         value = row.get(name)
         return math.inf if value is None else value
 
-    reasons = row["reasons"].count(";") + 1 if row["reasons"] else 0
+    reasons = row["reasons"].count(BETWEEN) + 1 if row["reasons"] else 0
     return (
         not row["error"],
         row["passed"],
@@ -172,12 +172,12 @@ def _differences(
     return {name: interval for name, interval in found.items() if interval}
 
 
-def _kinds(row: Mapping[str, Any]) -> set[str]:
+def kinds(row: Mapping[str, Any]) -> set[str]:
     """Return the reasons of a run without names and figures, so that they can be counted."""
     if row["error"]:
         return {"error"}
     found = set()
-    for reason in filter(None, row["reasons"].split("; ")):
+    for reason in filter(None, row["reasons"].split(BETWEEN)):
         text = re.sub(r"^\S+: (?!.*did not finish)", "", reason) if not reason.startswith("collision") else "collision"
         found.add(re.split(r":| up to|\s*\(?-?\d", text)[0].strip() or reason)
     return found

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
-from quarterdeck.campaign.kind import Kind, is_number
+from quarterdeck.campaign.kind import BETWEEN, Kind, is_number
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Scenario
 from quarterdeck.mission.triage.figures import figures
@@ -69,7 +69,7 @@ class TriageCase:
         """Return the figures, None where there is nobody whom they are about; passed is all found, told and treated."""
         outcome = case_outcome(_variant(self.conditions), self.seed, _site(text) if text else None)
         numbers = {name: value if math.isfinite(value) else None for name, value in figures(outcome).items()}
-        return {"passed": not outcome.reasons, "reasons": "; ".join(outcome.reasons)} | _apart(numbers, self.conditions)
+        return {"passed": not outcome.reasons, "reasons": BETWEEN.join(outcome.reasons)} | _apart(numbers, self.conditions)
 
     def replay(self, source: str, limits: Mapping[str, float]) -> str:  # noqa: ARG002
         """Return the commands that make the case and run it again."""

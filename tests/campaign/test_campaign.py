@@ -124,7 +124,7 @@ def test_the_summary_tells_and_the_worst_can_be_replayed(study: Writer, whole: P
     assert stop.value.code == 1
     again = json.loads(report.read_text(encoding="utf-8"))
     assert again["trace_hash"] == worst["trace_hash"]
-    assert "; ".join(again["reasons"]) == worst["reasons"]
+    assert " | ".join(again["reasons"]) == worst["reasons"]
     capfd.readouterr()
     assert campaign(study(STUDY), "-o", whole, "--least", 0.999, "--json") == 1
     assert json.loads(capfd.readouterr().out) == summary
