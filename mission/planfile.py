@@ -68,6 +68,12 @@ def _header(mission: Mission) -> dict[str, Any]:
     )
 
 
+def plan_outcome(mission: Mission) -> dict[str, Any]:
+    """Return what a plan comes to, for programs: `feasible`, `reasons`, `figures` and `bounds` as its file tells them."""
+    header = _header(mission)["properties"]
+    return {name: header[name] for name in ("feasible", "reasons", "figures", "bounds")}
+
+
 def _plain(value: Any, digits: int = 12) -> Any:
     """Return JSON's own types: numpy's become Python's, what is not finite becomes null, figures keep so many digits."""
     if isinstance(value, Mapping):

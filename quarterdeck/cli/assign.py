@@ -98,6 +98,7 @@ def command(
     from quarterdeck.api import assign, plan_text, read_scenario
     from quarterdeck.cli.advice import far_off, print_notes
     from quarterdeck.geo.geojson import opened
+    from quarterdeck.mission.planfile import plan_outcome
     from quarterdeck.mission.twin import map_scenario
 
     tell_compiling()
@@ -120,13 +121,11 @@ def command(
             bar.update(line, description=f"generation {done}: {best:,.1f}{gap}")
 
         mission = assign(scenario, twin=twin, shape=shape, shape_parameters=parameters, progress=progress, **options)
-    text = plan_text(mission)
     if write_map is not None:
         _write_map(scenario, Path(write_map), options["resolution"], force=force)
-    emit(text, output, force=force)
+    emit(plan_text(mission), output, force=force)
     if as_json:
-        header = json.loads(text.split("\n", 2)[1].rstrip(","))["properties"]
-        click.echo(json.dumps({k: header[k] for k in ("feasible", "reasons", "figures", "bounds")}), err=True)
+        click.echo(json.dumps(plan_outcome(mission)), err=True)
     else:
         _print(mission)
     if mission.figures["stopped"] == "interrupted":

@@ -82,6 +82,7 @@ def command(
     from quarterdeck.cli.advice import far_off, print_notes
     from quarterdeck.geo.deadline import limited
     from quarterdeck.geo.geojson import opened
+    from quarterdeck.mission.planfile import plan_outcome
 
     tell_compiling()
     given = {name: value for name, value in options.items() if value is not None}
@@ -102,11 +103,9 @@ def command(
         mission = plan(
             scenario, method=method, seed=seed, terrain=ground, tolerance=tolerance, time_limit=time_limit, **given
         )
-    text = plan_text(mission)
-    emit(text, output, force=force)
+    emit(plan_text(mission), output, force=force)
     if as_json:
-        header = json.loads(text.split("\n", 2)[1].rstrip(","))["properties"]
-        click.echo(json.dumps({k: header[k] for k in ("feasible", "reasons", "figures", "bounds")}), err=True)
+        click.echo(json.dumps(plan_outcome(mission)), err=True)
     else:
         print_figures(mission)
     if limit.interrupted:
