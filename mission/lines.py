@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from shapely import LineString
+from shapely import LineString, MultiPolygon
 
 from quarterdeck.coverage.laps import lap_space
 from quarterdeck.coverage.lines import Lines, lay_lines, split_area
@@ -86,28 +86,7 @@ def plan_lines(
         if again.makespan >= done.makespan:
             break
         done = again
-    laid = done.laid
     routes, reasons = urgent_first(scenario, roads, done.routes, done.reasons, step)
-    site = scenario.site.coverable
-    tracks = [t for lines in laid for t in lines.tracks]
-    length, covered = sum(track_length(t) for t in tracks), covered_fraction(tracks, site, step) * site.area
-    figures: dict[str, Any] = {
-        "poc": covered_fraction(survey_lines(routes), site, step),
-        "length": length,
-        "length_per_1000_m2": 1000.0 * length / site.area,
-        "overlap": length * step / covered - 1.0 if covered > 0 else 0.0,
-    }
-    if sounded:  # one width does not say what is covered
-        del figures["overlap"]
-        figures |= seen(scenario, area, routes)
-        figures["poc"] = figures.pop("seafloor_coverage", figures["poc"])
-    figures |= {
-        "lines": sum(len(lines.swaths) for lines in laid),
-        **({"laps": sum(len(lines.laps) for lines in laid)} if lap else {}),
-        "makespan": max(r.duration for r in routes),
-        "energy": sum(r.energy for r in routes),
-        "notes": done.notes,
-    }
     return Mission(
         name=scenario.name,
         frame=scenario.frame,
@@ -119,9 +98,9 @@ def plan_lines(
         seed=seed,
         spacing=step,
         tasks=scenario.tasks,
-        figures=figures,
+        figures=_figures(scenario, area, done, routes, step, sounded=sounded, lap=lap),
         reasons=tuple(reasons),
-        layers=() if ranked(scenario.site) else (_named(vehicles, laid),),
+        layers=() if ranked(scenario.site) else (_named(vehicles, done.laid),),
         input_hash=scenario.input_hash,
         version=VERSION,
     )
@@ -151,6 +130,39 @@ class _Attempt:
     def makespan(self) -> tuple[int, float]:
         """Less is better: what cannot be done, then seconds."""
         return len(self.reasons), max(r.duration for r in self.routes)
+
+
+def _figures(
+    scenario: Scenario,
+    area: MultiPolygon,
+    done: _Attempt,
+    routes: Sequence[Route],
+    step: float,
+    *,
+    sounded: bool,
+    lap: bool,
+) -> dict[str, Any]:
+    """Return what `routes` along the lines that are `done` come to, `step` metres apart where they are not `sounded`."""
+    site, laid = scenario.site.coverable, done.laid
+    tracks = [t for lines in laid for t in lines.tracks]
+    length, covered = sum(track_length(t) for t in tracks), covered_fraction(tracks, site, step) * site.area
+    figures: dict[str, Any] = {
+        "poc": covered_fraction(survey_lines(routes), site, step),
+        "length": length,
+        "length_per_1000_m2": 1000.0 * length / site.area,
+        "overlap": length * step / covered - 1.0 if covered > 0 else 0.0,
+    }
+    if sounded:  # one width does not say what is covered
+        del figures["overlap"]
+        figures |= seen(scenario, area, routes)
+        figures["poc"] = figures.pop("seafloor_coverage", figures["poc"])
+    return figures | {
+        "lines": sum(len(lines.swaths) for lines in laid),
+        **({"laps": sum(len(lines.laps) for lines in laid)} if lap else {}),
+        "makespan": max(r.duration for r in routes),
+        "energy": sum(r.energy for r in routes),
+        "notes": done.notes,
+    }
 
 
 def _routes(

@@ -8,7 +8,7 @@ import numpy as np
 from shapely import LineString
 
 from quarterdeck.coverage.metrics import covered_fraction
-from quarterdeck.geo.scenario import Site
+from quarterdeck.geo.scenario import Site, Vehicle
 from quarterdeck.geo.version import VERSION
 from quarterdeck.mission.fast import FastRun
 from quarterdeck.mission.mission import Mission, Route
@@ -227,63 +227,55 @@ def _reasons(
     allowed: Mapping[str, float | None],
     relieved: Collection[str],
 ) -> list[str]:
+    """Return why the run fails: what of the fleet, then of each vehicle, is over its limit."""
     reasons: list[str] = []
-
-    def over(name: str, value: float, text: str) -> None:
-        limit = allowed[name]
-        if limit is not None and value > limit + 1e-12:
-            reasons.append(text)
-
-    if figures["coverage_planned"] is not None:
-        loss = figures["coverage_planned"] - figures["coverage_driven"]
-        over(
-            "coverage_loss",
-            loss,
-            f"coverage {figures['coverage_driven']:.2%} driven of {figures['coverage_planned']:.2%} planned; "
-            f"{allowed['coverage_loss']:.2%} of the area may be lost (--limit coverage_loss=...)",
+    driven, covering = figures["coverage_driven"], figures["coverage_planned"]
+    if covering is not None and _over(allowed, "coverage_loss", covering - driven):
+        reasons.append(
+            f"coverage {driven:.2%} driven of {covering:.2%} planned; "
+            f"{allowed['coverage_loss']:.2%} of the area may be lost (--limit coverage_loss=...)"
         )
     touched = [v.id for v in vehicles if v.touched or v.hits]
-    over("collisions", len(touched), f"collision: {_list(touched)}")
+    reasons += [f"collision: {_list(touched)}"] if _over(allowed, "collisions", len(touched)) else []
     late = [v.id for v in vehicles if not v.finished and v.id not in relieved]
-    over("unfinished", len(late), f"did not finish: {_list(late)}")
-    unserved = figures["tasks_planned"] - figures["tasks_served"]
-    over("unserved", unserved, f"{unserved} of {figures['tasks_planned']} tasks not served")
+    reasons += [f"did not finish: {_list(late)}"] if _over(allowed, "unfinished", len(late)) else []
+    planned = figures["tasks_planned"]
+    unserved = planned - figures["tasks_served"]
+    reasons += [f"{unserved} of {planned} tasks not served"] if _over(allowed, "unserved", unserved) else []
     for vehicle, v in zip(mission.vehicles, vehicles, strict=True):
-        margin = vehicle.clearance / 2 if vehicle.clearance > 0 else vehicle.model.width
-        track, fence = (margin if (limit := allowed[name]) is None else limit for name in ("cross_track", "outside"))
-        if v.legs.p95 > track:
-            reasons.append(
-                f"{v.id}: off its straight legs by up to {v.legs.p95:.2f} m for 95 % of the way, allowed {track:.2f} m"
-            )
-        if v.outside > fence:
-            reasons.append(f"{v.id}: {v.outside:.2f} m outside the operating area, allowed {fence:.2f} m")
-        if v.clearance is not None and v.clearance < (allowed["clearance"] or 0.0):
-            reasons.append(
-                f"{v.id}: {v.clearance:.2f} m from obstacle {v.clearance_obstacle!r} at {v.clearance_time:.0f} s"
-            )
-        if v.separation is not None and v.separation < (allowed["separation"] or 0.0):
-            reasons.append(f"{v.id}: {v.separation:.2f} m from {v.separation_vehicle} at {v.separation_time:.0f} s")
-        if v.localisation is not None:
-            off = v.localisation.p95
-            over("localisation", off, f"{v.id}: 95 % of localisation errors up to {off:.2f} m")
-        over(
-            "battery",
-            v.energy / vehicle.battery,
-            f"{v.id}: used {v.energy:.0f} Wh of a battery of {vehicle.battery:.0f} Wh",
-        )
-        over(
-            "endurance",
-            v.time / vehicle.endurance,
-            f"{v.id}: {v.time:.0f} s under way, endurance {vehicle.endurance:.0f} s",
-        )
-    if figures["time_planned"] > 0:
-        ratio = figures["time"] / figures["time_planned"]
-        over(
-            "delay",
-            ratio,
-            f"took {figures['time']:.0f} s, planned {figures['time_planned']:.0f} s (allowed: {allowed['delay']:g} times)",
-        )
+        reasons += [f"{v.id}: {why}" for why in _vehicle_reasons(vehicle, v, allowed)]
+    if figures["time_planned"] > 0 and _over(allowed, "delay", figures["time"] / figures["time_planned"]):
+        times = f"took {figures['time']:.0f} s, planned {figures['time_planned']:.0f} s"
+        reasons.append(f"{times} (allowed: {allowed['delay']:g} times)")
     return reasons
+
+
+def _vehicle_reasons(vehicle: Vehicle, v: VehicleReport, allowed: Mapping[str, float | None]) -> list[str]:
+    """Return what of a vehicle is over its limit."""
+    reasons = []
+    margin = vehicle.clearance / 2 if vehicle.clearance > 0 else vehicle.model.width
+    track, fence = (margin if (limit := allowed[name]) is None else limit for name in ("cross_track", "outside"))
+    if v.legs.p95 > track:
+        reasons.append(f"off its straight legs by up to {v.legs.p95:.2f} m for 95 % of the way, allowed {track:.2f} m")
+    if v.outside > fence:
+        reasons.append(f"{v.outside:.2f} m outside the operating area, allowed {fence:.2f} m")
+    if v.clearance is not None and v.clearance < (allowed["clearance"] or 0.0):
+        reasons.append(f"{v.clearance:.2f} m from obstacle {v.clearance_obstacle!r} at {v.clearance_time:.0f} s")
+    if v.separation is not None and v.separation < (allowed["separation"] or 0.0):
+        reasons.append(f"{v.separation:.2f} m from {v.separation_vehicle} at {v.separation_time:.0f} s")
+    if v.localisation is not None and _over(allowed, "localisation", v.localisation.p95):
+        reasons.append(f"95 % of localisation errors up to {v.localisation.p95:.2f} m")
+    if _over(allowed, "battery", v.energy / vehicle.battery):
+        reasons.append(f"used {v.energy:.0f} Wh of a battery of {vehicle.battery:.0f} Wh")
+    if _over(allowed, "endurance", v.time / vehicle.endurance):
+        reasons.append(f"{v.time:.0f} s under way, endurance {vehicle.endurance:.0f} s")
+    return reasons
+
+
+def _over(allowed: Mapping[str, float | None], name: str, value: float) -> bool:
+    """Return whether a value is over the limit of a name, if there is one."""
+    limit = allowed[name]
+    return limit is not None and value > limit + 1e-12
 
 
 def _list(ids: Sequence[str]) -> str:
