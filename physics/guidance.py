@@ -205,67 +205,91 @@ def guide_multirotors(
     metres along the leg.
     """
     for i in range(len(tracks)):
-        t, lim = tracks[i], limits[i]
+        t, lim, ref = tracks[i], limits[i], reference[i]
         if t.mode == HOLD and time >= t.until:
             depart(t)
             t.reach = t.pace = 0.0
-        a, b = table[max(t.leg - 1, t.first)], table[t.leg]
-        dx, dy, dz = b.x - a.x, b.y - a.y, b.z - a.z
-        length = np.sqrt(dx * dx + dy * dy + dz * dz)
         if t.mode == SAIL:
-            # How far the vehicle trails its reference holds the reference back.
-            gap = np.sqrt((reference[i, 0] - position[i, 0]) ** 2 + (reference[i, 1] - position[i, 1]) ** 2
-                          + (reference[i, 2] - position[i, 2]) ** 2)  # fmt: skip
-            wanted = min(b.speed, max(t.slow, 0.0)) * min(max(2.0 - gap / 2.0, 0.0), 1.0)
-            if t.slow < 0.5 * b.speed and t.aside != t.want:  # first out of the other's way
-                wanted = 0.0
-            rate = lim.climb if dz > 0 else lim.sink
-            if length > 0 and abs(dz) / length * wanted > rate:
-                wanted = rate * length / abs(dz)
-            leave = 0.0 if stops(t, table, time) else _corner_speed(t, table, lim.accel)
-            wanted = min(wanted, np.sqrt(leave**2 + 2 * 0.7 * lim.accel * max(length - t.reach, 0.0)))
-            t.pace = min(max(wanted, t.pace - lim.accel * step), t.pace + 0.7 * lim.accel * step)
-            t.reach += max(t.pace, min(0.05, wanted)) * step
-            if t.slow < 0.0:  # astern
-                t.pace, t.reach = 0.0, max(t.reach + t.slow * step, 0.0)
-            if t.reach >= length:
-                if stops(t, table, time):
-                    t.reach, t.pace = length, 0.0
-                    if gap < 0.5 and abs(t.aside) < 0.2 * lim.length:  # back on its path
-                        arrive(t, table, time)
-                else:
-                    t.reach -= length
-                    t.leg += 1
-                    a, b = table[t.leg - 1], table[t.leg]
-                    dx, dy, dz = b.x - a.x, b.y - a.y, b.z - a.z
-                    length = np.sqrt(dx * dx + dy * dy + dz * dz)
-                    if t.aside != 0.0 and np.hypot(dx, dy) > 0.1:  # it stays where it is, to starboard of another leg
-                        turn = np.arctan2(dy, dx) - reference[i, 6]
-                        t.reach -= t.aside * np.sin(turn)
-                        t.aside *= np.cos(turn)
+            _run_along(t, lim, table, ref, position[i], time, step)
         if t.mode == SAIL:
-            s, v = (min(t.reach, length) / length, t.pace / length) if length > 0 else (1.0, 0.0)
-            reference[i, 0], reference[i, 1], reference[i, 2] = a.x + s * dx, a.y + s * dy, a.z + s * dz
-            reference[i, 3], reference[i, 4], reference[i, 5] = v * dx, v * dy, v * dz
-            if np.hypot(dx, dy) > 0.1:
-                reference[i, 6] = np.arctan2(dy, dx)
-            before, sin, cos = t.aside, np.sin(reference[i, 6]), np.cos(reference[i, 6])
-            # Here the shift is the motion: no faster than it gains in a look, and can stop.
-            most = min(LOOK * lim.accel, np.sqrt(lim.accel * abs(t.want - t.aside))) / SIDEWAYS
-            step_aside(t, min(b.speed, max(t.slow, 0.0), most), step)
-            shift = (t.aside - before) / step
-            reference[i, 0] += t.aside * sin
-            reference[i, 1] -= t.aside * cos
-            reference[i, 3] += shift * sin
-            reference[i, 4] -= shift * cos
-            px, py, pz = position[i, 0] - a.x, position[i, 1] - a.y, position[i, 2] - a.z
-            along = (px * dx + py * dy + pz * dz) / max(length, 1e-9)
-            t.cross = np.sqrt(max(px * px + py * py + pz * pz - along * along, 0.0))
-            t.turning = along < lim.zone or length - along < lim.zone or t.aside != 0
+            _refer(t, lim, table, ref, position[i], step)
         else:
-            reference[i, 0], reference[i, 1], reference[i, 2] = b.x, b.y, b.z
-            reference[i, 3] = reference[i, 4] = reference[i, 5] = 0.0
+            b = table[t.leg]
+            ref[0], ref[1], ref[2] = b.x, b.y, b.z
+            ref[3] = ref[4] = ref[5] = 0.0
             t.cross, t.turning = 0.0, True
+
+
+@njit(cache=True)
+def _run_along(
+    t: Any, lim: Any, table: np.ndarray, ref: np.ndarray, position: np.ndarray, time: float, step: float
+) -> None:
+    """Let the reference run on along its leg within the limits, and onto the next one at its end.
+
+    How far the vehicle at `position` (3,) trails its reference `ref` (7,) holds that back.
+    """
+    b = table[t.leg]
+    _, _, dz, length = _way_of(t, table)
+    gap = np.sqrt((ref[0] - position[0]) ** 2 + (ref[1] - position[1]) ** 2 + (ref[2] - position[2]) ** 2)
+    wanted = min(b.speed, max(t.slow, 0.0)) * min(max(2.0 - gap / 2.0, 0.0), 1.0)
+    if t.slow < 0.5 * b.speed and t.aside != t.want:  # first out of the other's way
+        wanted = 0.0
+    rate = lim.climb if dz > 0 else lim.sink
+    if length > 0 and abs(dz) / length * wanted > rate:
+        wanted = rate * length / abs(dz)
+    leave = 0.0 if stops(t, table, time) else _corner_speed(t, table, lim.accel)
+    wanted = min(wanted, np.sqrt(leave**2 + 2 * 0.7 * lim.accel * max(length - t.reach, 0.0)))
+    t.pace = min(max(wanted, t.pace - lim.accel * step), t.pace + 0.7 * lim.accel * step)
+    t.reach += max(t.pace, min(0.05, wanted)) * step
+    if t.slow < 0.0:  # astern
+        t.pace, t.reach = 0.0, max(t.reach + t.slow * step, 0.0)
+    if t.reach < length:
+        return
+    if stops(t, table, time):
+        t.reach, t.pace = length, 0.0
+        if gap < 0.5 and abs(t.aside) < 0.2 * lim.length:  # back on its path
+            arrive(t, table, time)
+        return
+    t.reach -= length
+    t.leg += 1
+    dx, dy, _, _ = _way_of(t, table)
+    if t.aside != 0.0 and np.hypot(dx, dy) > 0.1:  # it stays where it is, to starboard of another leg
+        turn = np.arctan2(dy, dx) - ref[6]
+        t.reach -= t.aside * np.sin(turn)
+        t.aside *= np.cos(turn)
+
+
+@njit(cache=True)
+def _refer(t: Any, lim: Any, table: np.ndarray, ref: np.ndarray, position: np.ndarray, step: float) -> None:
+    """Set the reference `ref` (7,) to where the track has come to on its leg, and as far aside as is wanted."""
+    a, b = table[max(t.leg - 1, t.first)], table[t.leg]
+    dx, dy, dz, length = _way_of(t, table)
+    s, v = (min(t.reach, length) / length, t.pace / length) if length > 0 else (1.0, 0.0)
+    ref[0], ref[1], ref[2] = a.x + s * dx, a.y + s * dy, a.z + s * dz
+    ref[3], ref[4], ref[5] = v * dx, v * dy, v * dz
+    if np.hypot(dx, dy) > 0.1:
+        ref[6] = np.arctan2(dy, dx)
+    before, sin, cos = t.aside, np.sin(ref[6]), np.cos(ref[6])
+    # Here the shift is the motion: no faster than it gains in a look, and can stop.
+    most = min(LOOK * lim.accel, np.sqrt(lim.accel * abs(t.want - t.aside))) / SIDEWAYS
+    step_aside(t, min(b.speed, max(t.slow, 0.0), most), step)
+    shift = (t.aside - before) / step
+    ref[0] += t.aside * sin
+    ref[1] -= t.aside * cos
+    ref[3] += shift * sin
+    ref[4] -= shift * cos
+    px, py, pz = position[0] - a.x, position[1] - a.y, position[2] - a.z
+    along = (px * dx + py * dy + pz * dz) / max(length, 1e-9)
+    t.cross = np.sqrt(max(px * px + py * py + pz * pz - along * along, 0.0))
+    t.turning = along < lim.zone or length - along < lim.zone or t.aside != 0
+
+
+@njit(cache=True)
+def _way_of(t: Any, table: np.ndarray) -> tuple[float, float, float, float]:
+    """Return how far the leg goes in x, y and z, and its length, metres."""
+    a, b = table[max(t.leg - 1, t.first)], table[t.leg]
+    dx, dy, dz = b.x - a.x, b.y - a.y, b.z - a.z
+    return dx, dy, dz, np.sqrt(dx * dx + dy * dy + dz * dz)
 
 
 @njit(cache=True)
