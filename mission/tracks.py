@@ -1,6 +1,6 @@
 """What really happened, from logs: where each vehicle of a plan was, on the mission's clock, and what is wrong with it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -132,7 +132,17 @@ def record(mission: Mission, files: Sequence[Sequence[tuple[str, Log]]], *, star
         # A triage plan's routes are what everybody would do if nobody were found: they tell neither when nor where.
         tracks.append(moved if triage else until_home(mission.vehicle(vehicle_id), routes[vehicle_id], moved))
     reasons += [] if triage else map(Reason, _on_other_routes(mission, tracks))
-    lost = []
+    lost, told = _lost_tracks(mission, logs, start)
+    notes += told
+    return Record(tuple(tracks), tuple(notes), tuple(reasons), start, tuple(lost))
+
+
+def _lost_tracks(mission: Mission, logs: Mapping[str, list[Log]], start: float | None) -> tuple[list[Track], list[str]]:
+    """Return the tracks of vehicles that the plan has given up, as far as they are known, and what is to be told of them.
+
+    `start` is the mission's, in Unix seconds, where it is known.
+    """
+    lost, notes = list[Track](), list[str]()
     for vehicle in mission.lost:  # it has no route: its clock is the others', or the mission's
         if vehicle.id not in logs:
             notes.append(f"{vehicle.id}: lost before this plan began; it has no route in it, and nothing is expected of it")
@@ -147,7 +157,7 @@ def record(mission: Mission, files: Sequence[Sequence[tuple[str, Log]]], *, star
             else:
                 lost.append(heard)
                 notes.append(f"{vehicle.id}: given up by this plan; where it is and what it surveyed is taken from its log")
-    return Record(tuple(tracks), tuple(notes), tuple(reasons), start, tuple(lost))
+    return lost, notes
 
 
 def _began(vehicle: Vehicle, route: Route, log: Log, track: Track) -> float:
