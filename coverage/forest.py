@@ -8,9 +8,11 @@ import numpy as np
 from numba import njit
 
 from quarterdeck.coverage.graph import Graph
+from quarterdeck.geo.deadline import go_on
 
 ROOT, ABSENT = -2, -1
 NEVER = np.iinfo(np.int64).max
+ROUNDS = 16  # of turns, between two looks at the limit
 TIE = 1e-9  # relative: guards this near to equally far are a tie
 
 
@@ -75,19 +77,13 @@ def grow(
     immediate guard can be reached from the tree by a path with no other guard and no vertex of the tree inside. Of guards
     equally near, the one farthest from those `last` chosen by the other robots, summed. Returns whether all are visited.
     """
-    return _grow(
-        reduced.starts,
-        reduced.indices,
-        reduced.lengths,
-        reduced.points,
-        guard,
-        parents,
-        ticks,
-        visited,
-        last,
-        np.asarray(turns, dtype=np.int64),
-        tick,
-    )
+    graph = (reduced.starts, reduced.indices, reduced.lengths, reduced.points)
+    turns = np.asarray(turns, dtype=np.int64)
+    while True:
+        left, moved, tick = _grow(*graph, guard, parents, ticks, visited, last, turns, tick)
+        if not left or not moved:
+            return not left
+        go_on("growing trees to the guards")
 
 
 def prune(forest: Forest, robots: np.ndarray | None = None, seen: np.ndarray | None = None) -> Forest:
@@ -141,7 +137,8 @@ def _grow(
     last: np.ndarray,
     turns: np.ndarray,
     tick: int,
-) -> bool:
+) -> tuple[int, bool, int]:
+    """Let each robot take ROUNDS turns; return how many guards are left, whether any could move, and the next tick."""
     n = len(guard)
     for robot in turns:  # a start that another owned until it was lost is in the tree already
         for v in range(n):
@@ -152,7 +149,10 @@ def _grow(
     for v in range(n):
         left += guard[v] and not visited[v]
     distance, before = np.empty(n), np.empty(n, dtype=np.int64)
-    while left:
+    moved = True
+    for _ in range(ROUNDS):
+        if not (left and moved):
+            break
         moved = False
         for robot in turns:
             if left == 0:
@@ -171,9 +171,7 @@ def _grow(
             while parents[robot, v] == -1:
                 parents[robot, v] = before[v]
                 v = before[v]
-        if not moved:
-            return False
-    return True
+    return left, moved, tick
 
 
 @njit(cache=True)

@@ -13,8 +13,12 @@ class UnavailableError(QuarterdeckError, RuntimeError):
     """Something that this machine lacks is needed, such as PyBullet. The text says how to get it; exit status 2."""
 
 
-class OutOfTimeError(QuarterdeckError, TimeoutError):
-    """The time limit, or Ctrl-C, came before there was any result. The text says what was not done and what to do."""
+class OutOfTimeError(QuarterdeckError, RuntimeError):
+    """The time limit came before there was any result, or Ctrl-C where `interrupted`: exit status 2, or 130."""
+
+    def __init__(self, text: str, *, interrupted: bool) -> None:
+        super().__init__(text)
+        self.interrupted = interrupted
 
 
 def one_line(text: str) -> str:

@@ -10,8 +10,10 @@ import numpy as np
 import shapely
 from numba import njit
 
+from quarterdeck.geo.deadline import go_on
 from quarterdeck.geo.triangulation import Triangulation
 
+BATCH = 256  # views, between two looks at the limit
 DISC_SIDES = 64  # of the regular polygon that stands for the disc: inscribed it loses 0.16 % of the area
 ON_EDGE = 1e-12  # of the coordinates: a point this near an edge lies on it
 
@@ -22,11 +24,19 @@ def visibility_polygons(
     """Return (k,) polygons: what each of (k, 2) `points` sees within its range, (k,) or one for all, in metres.
 
     The disc is an inscribed regular polygon, so that each is truly seen; with `outer` a circumscribed one, so that nothing
-    that is seen is missing. A point in no triangle sees nothing: an empty polygon.
+    that is seen is missing. A point in no triangle sees nothing: an empty polygon. Raises OutOfTimeError where abandoned.
     """
     points = np.ascontiguousarray(points, dtype=float).reshape(-1, 2)
     ranges = np.full(len(points), ranges, dtype=float)
     reach = ranges / np.cos(np.pi / DISC_SIDES) if outer else ranges
+    views = [_polygons(mesh, points[:BATCH], reach[:BATCH])]
+    for begin in range(BATCH, len(points), BATCH):
+        go_on(f"looking around from {len(points):,} places")
+        views.append(_polygons(mesh, points[begin : begin + BATCH], reach[begin : begin + BATCH]))
+    return np.concatenate(views)
+
+
+def _polygons(mesh: Triangulation, points: np.ndarray, reach: np.ndarray) -> np.ndarray:
     coordinates, sizes = _outlines(mesh.vertices, mesh.triangles, mesh.neighbours, *_homes(mesh, points), points, reach)
     index = np.repeat(np.arange(len(points)), sizes)
     stars = np.full(len(points), shapely.Polygon(), dtype=object)

@@ -11,6 +11,7 @@ from quarterdeck.coverage.cst import constrained_tour
 from quarterdeck.coverage.guards.space import Space
 from quarterdeck.coverage.metrics import track_length
 from quarterdeck.coverage.network import Network, network
+from quarterdeck.geo.errors import OutOfTimeError
 from quarterdeck.geo.geodesics import Geodesics, geodesics
 from quarterdeck.geo.scenario import Vehicle
 from quarterdeck.mission.corners import bends
@@ -18,6 +19,7 @@ from quarterdeck.mission.guard_tours import improve_tours, makespan_bound, tour_
 from quarterdeck.mission.mission import Guard, Layer, Leg, Route
 from quarterdeck.mission.timing import timed_route
 
+BOUNDED = 1200  # guards: ways between more take too long and too much memory, for a bound alone
 SHARP = np.pi / 3  # radians: an arc at a sharper bend passes more than a seventh of its radius away from the corner
 
 
@@ -70,7 +72,6 @@ def paper_tours(space: Space, guards: np.ndarray, team: Team) -> Tours:
     net = network(space.reach, guards, team.starts)
     number = {int(v): i for i, v in enumerate(net.guards)}
     k = len(team.vehicles)
-    ways = geodesics(space.reach, np.concatenate([net.cdt.points[net.entries], team.homes]))
     orders, lines, stops = [], [], []
     seen: set[int] = set()
     for robot in range(k):
@@ -79,18 +80,30 @@ def paper_tours(space: Space, guards: np.ndarray, team: Team) -> Tours:
         order, at, before = [], [], len(net.access[robot]) - 1
         for i, v in enumerate(walk):
             guard = number.get(v)
-            if guard in mine and guard not in order:
+            if guard in mine:
+                mine.discard(guard)
                 order.append(guard)
                 at.append(before + i)
         seen |= set(order)
         round_trip = np.allclose(team.homes[robot], team.starts[robot])
-        back = net.access[robot][::-1] if round_trip else ways.path(robot, k + robot)
+        entry, home = net.cdt.points[net.entries[robot]], team.homes[robot]
+        back = net.access[robot][::-1] if round_trip else geodesics(space.reach, np.stack([entry, home])).path(0, 1)
         lines.append(np.vstack([net.access[robot][:-1], net.cdt.points[walk], back[1:]]))
         orders.append(tuple(order))
         stops.append(tuple(at))
     times = np.array([track_length(line) for line in lines]) / team.speeds
-    bound = makespan_bound(_ways(space, guards, team).lengths, team.speeds)
-    return Tours(guards, net, tuple(orders), tuple(lines), tuple(stops), times, bound)
+    return Tours(guards, net, tuple(orders), tuple(lines), tuple(stops), times, _bound(space, guards, team))
+
+
+def _bound(space: Space, guards: np.ndarray, team: Team) -> float:
+    """Return seconds that no tours past the guards can beat; of many it is that of some, in no time as the crow flies."""
+    some = guards[:: max(1, -(-len(guards) // BOUNDED))]
+    try:
+        lengths = _ways(space, some, team).lengths
+    except OutOfTimeError:
+        places = np.concatenate([some, team.starts, team.homes])
+        lengths = np.linalg.norm(places[:, None] - places, axis=2)
+    return makespan_bound(lengths, team.speeds)
 
 
 def shorter_tours(

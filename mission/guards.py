@@ -1,6 +1,7 @@
 """Coverage by robots of limited visibility: guards, tours past them, and the proof that all is seen."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -13,8 +14,8 @@ from quarterdeck.coverage.guards.certificate import TOLERANCE, mend, uncovered
 from quarterdeck.coverage.guards.fewer import fewer_guards, needless
 from quarterdeck.coverage.guards.pieces import paper_guards
 from quarterdeck.coverage.guards.space import Space, border_of, space_of
-from quarterdeck.geo.deadline import time_is_up
-from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.deadline import abandoning, time_is_up
+from quarterdeck.geo.errors import InputError, OutOfTimeError
 from quarterdeck.geo.scenario import Scenario, Vehicle, as_multipolygon
 from quarterdeck.geo.triangulation import Triangulation, triangulate
 from quarterdeck.geo.version import VERSION
@@ -26,6 +27,7 @@ from quarterdeck.mission.timing import shortfalls
 
 Mode = Literal["optimised", "paper"]
 MOST_GUARDS = 400  # by area alone: the tours past them are searched over all distances between them
+ADVICE = "give it longer, or the site longer ranges or obstacles of fewer corners"
 METHOD = "target less the union of range-limited visibility polygons, discs inscribed"
 
 
@@ -57,17 +59,19 @@ def plan_guards(
             f"a range of {reach:g} m over {space.target.area:.4g} m2 takes at least {least:,.0f} guards; "
             f"up to {MOST_GUARDS:,} are planned: give a longer range, a smaller area, or sweep it with --method stc"
         )
-    mesh = triangulate(space.sight)
-    guards, unseen = mend(space, mesh, paper_guards(space, reach), reach)
-    seeable = space if unseen.is_empty else replace(space, target=as_multipolygon(space.target.difference(unseen)))
-    if seeable.target.is_empty:
-        raise InputError(
-            f"no part of the area can be seen from within {reach:g} m of where the vehicles may be; "
-            "draw the operating area about it, or give a longer range"
-        )
-    paper = paper_tours(space, guards, team)
-    paper_will_do = mode == "paper" or time_is_up("the search for fewer guards and shorter tours")
-    tours = paper if paper_will_do else _optimised(scenario, seeable, mesh, paper, team, seed)
+    with abandoning(ADVICE):
+        mesh = triangulate(space.sight)
+        guards, unseen = mend(space, mesh, paper_guards(space, reach), reach)
+        seeable = space if unseen.is_empty else replace(space, target=as_multipolygon(space.target.difference(unseen)))
+        if seeable.target.is_empty:
+            raise InputError(
+                f"no part of the area can be seen from within {reach:g} m of where the vehicles may be; "
+                "draw the operating area about it, or give a longer range"
+            )
+        paper = paper_tours(space, guards, team)
+        paper_will_do = mode == "paper" or time_is_up("the search for fewer guards and shorter tours")
+        tours = paper if paper_will_do else _optimised(scenario, seeable, mesh, paper, team, seed)
+        least = guards_bound(seeable, mesh, reach, seed=seed)
     reasons = [] if unseen.is_empty else [Reason(f"{unseen.area:.6g} m2 cannot be seen from where the vehicles may be")]
     mission = guards_mission(scenario, space, mesh, tours, team, reasons)
     compared = {"guards": len(paper.guards), "makespan": paper.makespan, "bound": paper.bound}
@@ -76,7 +80,7 @@ def plan_guards(
         parameters={"range": range, "mode": mode, "inspect": inspect},
         seed=seed,
         figures={**mission.figures, "paper": compared},
-        bounds={**mission.bounds, "guards": guards_bound(seeable, mesh, reach, seed=seed)},
+        bounds={**mission.bounds, "guards": least},
     )
 
 
@@ -127,14 +131,20 @@ def guards_mission(
 
 
 def _optimised(scenario: Scenario, space: Space, mesh: Triangulation, paper: Tours, team: Team, seed: int) -> Tours:
-    """Return tours past few guards; past the paper's own where those would not be shorter than the paper's."""
+    """Return tours past few guards; past the paper's own where those would not be shorter, or at the limit."""
     reach = float(team.ranges.min())
-    few = fewer_guards(space, mesh, paper.guards, reach, seed=seed)
-    ranks = guard_ranks(scenario, space, mesh, few, reach)
-    tours = shorter_tours(space, paper_tours(space, few, team), team, ranks=ranks, seed=seed)
-    if ranks is None and tours.makespan > paper.makespan:
-        tours = shorter_tours(space, paper, team, seed=seed)
-    return _seen_from_afar(space, mesh, tours, team, ranks, seed)
+    tours = paper
+    with suppress(OutOfTimeError):
+        few = fewer_guards(space, mesh, paper.guards, reach, seed=seed)
+        begun = paper_tours(space, few, team)
+        tours = min(paper, begun, key=lambda t: t.makespan)
+        ranks = guard_ranks(scenario, space, mesh, few, reach)
+        tours = shorter_tours(space, begun, team, ranks=ranks, seed=seed)
+        if ranks is None and tours.makespan > paper.makespan:
+            tours = paper
+            tours = shorter_tours(space, paper, team, seed=seed)
+        tours = _seen_from_afar(space, mesh, tours, team, ranks, seed)
+    return tours
 
 
 def guard_ranks(

@@ -1,5 +1,7 @@
 """A bound that no guards can beat: points of which no two can be seen from one place need a guard each."""
 
+from contextlib import suppress
+
 import numpy as np
 import shapely
 from scipy.sparse import csr_array
@@ -7,6 +9,7 @@ from scipy.sparse import csr_array
 from quarterdeck.coverage.guards.cover import small_cover
 from quarterdeck.coverage.guards.space import Space
 from quarterdeck.geo.deadline import time_is_up
+from quarterdeck.geo.errors import OutOfTimeError
 from quarterdeck.geo.triangulation import Triangulation
 from quarterdeck.geo.visibility import visibility_polygons
 
@@ -42,7 +45,9 @@ def guards_bound(space: Space, mesh: Triangulation, reach: float, *, seed: int =
     by_area = int(np.ceil(space.target.area / (np.pi * reach**2) - 1e-9))
     if time_is_up("the bound on guards by witnesses"):
         return max(by_area, 1)
-    return max(by_area, len(independent_witnesses(space, mesh, reach, seed=seed)), 1)
+    with suppress(OutOfTimeError):
+        return max(by_area, len(independent_witnesses(space, mesh, reach, seed=seed)), 1)
+    return max(by_area, 1)
 
 
 def _candidates(space: Space, reach: float) -> np.ndarray:

@@ -12,7 +12,7 @@ from scipy.sparse import csr_array, vstack
 from quarterdeck.coverage.guards.certificate import TOLERANCE
 from quarterdeck.coverage.guards.cover import small_cover
 from quarterdeck.coverage.guards.space import HAIR, Space
-from quarterdeck.geo.deadline import time_is_up
+from quarterdeck.geo.deadline import go_on, time_is_up
 from quarterdeck.geo.scenario import as_multipolygon
 from quarterdeck.geo.triangulation import Triangulation
 from quarterdeck.geo.visibility import DISC_SIDES, visibility_polygons, visible_points
@@ -141,6 +141,7 @@ def needless(target: shapely.MultiPolygon, views: np.ndarray) -> np.ndarray:
     present = np.ones(len(views), dtype=np.bool_)
 
     def alone(i: int) -> float:
+        go_on("leaving out guards that are not needed")
         near = tree.query(views[i], predicate="intersects")
         others = np.sort(near[present[near] & (near != i)])
         return float(seen[i].difference(shapely.union_all(views[others])).area)

@@ -6,6 +6,7 @@ from numba import njit
 from shapely import MultiPolygon, Polygon
 
 from quarterdeck.coverage.guards.space import HAIR, Space
+from quarterdeck.geo.deadline import go_on
 from quarterdeck.geo.visibility import DISC_SIDES
 
 SNAP = 1e-12  # of the extent: the grid on which trapezoids are cut
@@ -24,6 +25,7 @@ def paper_guards(space: Space, reach: float) -> np.ndarray:
     for trapezoid in trapezoids(space.target):
         stack = [trapezoid]
         while stack:
+            go_on("placing guards")
             piece = stack.pop()
             guard = _guard(piece, space, radius, everywhere)
             if guard is not None:

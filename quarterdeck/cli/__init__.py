@@ -12,7 +12,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from quarterdeck import __version__
-from quarterdeck.geo.errors import QuarterdeckError, one_line
+from quarterdeck.geo.errors import OutOfTimeError, QuarterdeckError, one_line
 
 VERBS = {
     "chart": "ENC cells as a site.",
@@ -113,7 +113,7 @@ def main(args: list[str] | None = None) -> None:
     try:
         status = group.main(args=args, prog_name="quarterdeck", standalone_mode=False)
     except QuarterdeckError as error:
-        _stop(f"quarterdeck: {one_line(str(error))}", 2)
+        _stop(f"quarterdeck: {one_line(str(error))}", 130 if isinstance(error, OutOfTimeError) and error.interrupted else 2)
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)

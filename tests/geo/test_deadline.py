@@ -7,7 +7,8 @@ import time
 import pytest
 from numba.core import event
 
-from quarterdeck.geo.deadline import cause, limited, time_is_up, time_left
+from quarterdeck.geo.deadline import abandoning, cause, go_on, limited, time_is_up, time_left
+from quarterdeck.geo.errors import OutOfTimeError
 
 
 def test_without_a_limit_time_is_never_up():
@@ -77,3 +78,18 @@ def test_the_first_interrupt_ends_searches_and_the_second_everything():
         with pytest.raises(KeyboardInterrupt):
             os.kill(os.getpid(), signal.SIGINT)
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_only_what_may_be_abandoned_is_at_the_limit():
+    """What has no result before its end says so, with what to do; elsewhere it is finished, whatever the limit."""
+    with limited(1e-9), abandoning("give it longer"):
+        with pytest.raises(
+            OutOfTimeError, match="time limit while digging, before there was any result; give it longer"
+        ) as told:
+            go_on("digging")
+        assert not told.value.interrupted
+    with limited(1e-9) as limit:
+        go_on("digging")
+    assert limit.cut == []
+    with abandoning("give it longer"):
+        go_on("digging")

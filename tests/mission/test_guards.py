@@ -6,10 +6,12 @@ import shapely
 
 from quarterdeck.coverage.guards import certificate
 from quarterdeck.coverage.guards.certificate import uncovered_by_shadows
-from quarterdeck.geo.errors import InputError
+from quarterdeck.geo.deadline import limited
+from quarterdeck.geo.errors import InputError, OutOfTimeError
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.models import load_model
 from quarterdeck.geo.scenario import Area, Obstacle, Scenario, Site, Vehicle, as_multipolygon
+from quarterdeck.mission import guards as planner
 from quarterdeck.mission.guard_check import unproved
 from quarterdeck.mission.guards import plan_guards
 from quarterdeck.mission.mission import Mission
@@ -200,3 +202,29 @@ def test_a_plan_that_skips_a_guard_does_not_pass_the_check() -> None:
     problems = unproved(replace(mission, routes=(short, *mission.routes[1:])))
     assert problems[0] == f"r0: does not pass {stop.task}"
     assert "m2 are in no guard's view" in problems[1]
+
+
+def test_a_limit_before_the_first_tours_is_told_in_a_line() -> None:
+    """There is no plan without guards and tours past them: the line says what was being done, and what to do."""
+    with limited(1e-9), pytest.raises(OutOfTimeError, match=r"^time limit while placing guards, .*; give it longer"):
+        plan_guards(scenario((10.0, 10.0)), range=20.0)
+
+
+def test_a_limit_in_any_later_stage_leaves_the_paper_s_plan(monkeypatch) -> None:
+    """Once the paper's tours are there, whatever the limit ends after them, everything is still seen."""
+    tours = planner.paper_tours
+    with limited(3600.0) as limit:
+
+        def slow(*given):
+            made = tours(*given)
+            limit.ends = 0.0
+            return made
+
+        monkeypatch.setattr(planner, "paper_tours", slow)
+        monkeypatch.setattr(planner, "time_is_up", lambda _: False)  # the search for less begins, and is ended
+        mission = plan_guards(scenario((10.0, 10.0)), range=20.0)
+    assert mission.feasible
+    assert mission.figures["certificate"]["uncovered"] == 0.0
+    assert mission.figures["guards"] <= mission.figures["paper"]["guards"]
+    assert mission.figures["makespan"] <= mission.figures["paper"]["makespan"]
+    assert limit.cut
