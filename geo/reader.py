@@ -53,7 +53,8 @@ def _scenario(source: str | Path | Document, frame: Frame | None, tasks: Collect
     document = opened(source)
     scenario, problems = _read(document, frame, tasks)
     if scenario is None:
-        more = f" (and {len(problems) - 1} more; `quarterdeck check` lists them)" if len(problems) > 1 else ""
+        listed = "; `quarterdeck check` lists them" if frame is None else ""
+        more = f" (and {len(problems) - 1} more{listed})" if len(problems) > 1 else ""
         raise InputError(f"{document.name}: {problems[0]}{more}")
     return scenario
 
@@ -61,7 +62,7 @@ def _scenario(source: str | Path | Document, frame: Frame | None, tasks: Collect
 def examine(source: str | Path | Document) -> tuple[Scenario | None, list[str]]:
     """Return the scenario in a GeoJSON file, None where it has problems, and every problem, one line each.
 
-    Raises InputError if it is no GeoJSON in WGS84.
+    Raises InputError if it is no GeoJSON in WGS84, or no site.
     """
     return _read(opened(source))
 
@@ -91,7 +92,7 @@ def _read(
     content = document.content
     kind = kind_of_json(content)
     if kind not in (None, SITE, CHANGES):
-        return None, [f"is {kind}"]
+        raise InputError(f"{document.name}: is {kind}")
     problems: list[str] = []
     counted = [(i, raw) for i, raw in enumerate(content["features"]) if frame is None or added(raw)]
     features = [f for i, raw in counted if (f := _feature(i, raw, problems, site=frame is None))]

@@ -55,6 +55,8 @@ def track_file(ids: Sequence[str], given: str) -> tuple[str, str, str]:
     vehicle, equals, path = given.partition("=")
     if not equals or (vehicle not in ids and Path(given).exists()):
         vehicle, path = "", given
+    if not path:
+        raise InputError(f"--track {given}: there is no path; give that of a log")
     if vehicle and vehicle not in ids:
         raise InputError(f"--track {given}: unknown vehicle {vehicle!r}; the plan has {', '.join(ids)}")
     name = ""
@@ -77,7 +79,8 @@ def _assigned(mission: Mission, given: str) -> list[tuple[str, Log]]:
         return named
     vehicle = vehicle or Path(path).stem
     if vehicle not in ids:
-        raise InputError(f"{path}: whose is it? Write --track VEHICLE={path}, with one of {', '.join(ids)}")
+        whose = f"is of {', '.join(filter(None, inside))}, none of them in this plan" if any(inside) else "whose is it?"
+        raise InputError(f"{path}: {whose}; write --track VEHICLE={path}, with one of {', '.join(ids)}")
     own = [log for log in logs if log.vehicle == vehicle] or logs
     if len({log.vehicle for log in own}) > 1:
         raise InputError(

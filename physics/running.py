@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from quarterdeck.geo.angles import wrap
+from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Site
 from quarterdeck.geo.terrain import Terrain
 from quarterdeck.mission.director import Director, Event, State, wake_time
@@ -28,6 +29,7 @@ from quarterdeck.physics.wind import Wind
 from quarterdeck.physics.world import INCONSISTENT, World
 
 DECIDE = 1.0  # s between calls of the director
+WILD = 1000.0  # m/s: so fast is no vehicle
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -86,7 +88,7 @@ class Running:
         return self.fleet.gather("idle") & self.status.alive & ~stuck
 
     def advance(self) -> None:
-        """One step of the world."""
+        """One step of the world. Raises InputError where the weather throws a model out of all bounds."""
         step = self.world.step
         self.link.events += self.status.befall(self.time, self.fleet)
         if self.watch.wary and round(self.time / step) % max(1, round(WARY / step)) == 0:
@@ -97,6 +99,10 @@ class Running:
             squad.drive(step, self.current, wind[squad.index])
         position, heading = self.fleet.poses()
         velocity = (position - self.position) / step
+        wild = ~(np.abs(velocity) < WILD).all(axis=1)
+        if wild.any():
+            name = self.ids[int(np.argmax(wild))]
+            raise InputError(f"{name}: its model does not hold in such weather; give less current, wind or gusts")
         rate = wrap(heading - self.heading) / step
         rise = self._rise(self.terrain, position, heading) / step if self.terrain is not None else np.zeros(self.count)
         self._touch(position, heading, velocity, rate, rise)

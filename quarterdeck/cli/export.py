@@ -39,7 +39,7 @@ def _formats(ctx: click.Context, param: click.Parameter, incomplete: str) -> lis
     show_default=True,
     help="What heights count from: home, the terrain, mean sea level.",
 )
-@click.option("--ground", type=Real(), help="Metres of the ground above mean sea level, for amsl.")
+@click.option("--ground", type=Real(-500, 9000), help="Metres of the ground above mean sea level, for amsl.")
 @terrain_option
 @tolerance_option
 @click.option("--storage", type=Choice(["4", "8", "15", "16", "32"]), default="16", show_default=True,
@@ -69,6 +69,8 @@ def command(
     from quarterdeck.mission.planfile import read_plan
 
     names = list(FORMATS) if formats == "all" else [name.strip() for name in formats.split(",") if name.strip()]
+    if not names:
+        raise click.UsageError(f"--to names no format; known: {', '.join(FORMATS)}")
     mission = read_plan(plan)
     if terrain:
         from quarterdeck.geo.terrain import read_terrain

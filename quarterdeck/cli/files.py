@@ -43,7 +43,9 @@ def writes(*names: str, metavar: str = "FILE", help: str, **attributes: Any) -> 
     return click.option(*names, type=written, metavar=metavar, callback=_not_there, help=help, **attributes)
 
 
-def _not_there(ctx: click.Context, param: click.Parameter, output: Any) -> Any:  # noqa: ARG001
+def _not_there(ctx: click.Context, param: click.Parameter, output: Any) -> Any:
+    if output == "":
+        raise click.BadParameter("there is no path; give that of a file", ctx, param)
     if output and output != "-":
         refuse_existing(Path(output), force=ctx.params["force"])
     return output

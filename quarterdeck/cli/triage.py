@@ -99,7 +99,12 @@ _FROM_ZERO = Real(min=0, max=1e9)
               help="Fewest and most of a generated case.")  # fmt: skip
 @click.option("--clustered", is_flag=True, help="Gather a generated case's casualties in clusters.")
 @click.option(
-    "--field", nargs=2, type=_AMOUNT, default=(80.0, 50.0), show_default=True, help="Width and height without SITE, m."
+    "--field",
+    nargs=2,
+    type=Real(min=0, min_open=True, max=200_000),
+    default=(80.0, 50.0),
+    show_default=True,
+    help="Width and height without SITE, m.",
 )
 @click.option("--team", nargs=3, type=click.IntRange(min=0), default=(3, 1, 1), show_default=True,
               help="UGVs, UAVs and medics without SITE.")  # fmt: skip

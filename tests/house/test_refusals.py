@@ -6,7 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from quarterdeck.api import write_plan
 from quarterdeck.cli import main
+from quarterdeck.geo.reader import read_scenario
+from quarterdeck.mission.cover import cover
 
 DATA = Path(__file__).parents[2] / "data"
 
@@ -101,6 +104,27 @@ def test_a_file_of_another_verb_is_told_what_it_is(tmp_path, capsys):
     assert "is an ENC cell; `chart`" in refused(capsys, "plan", DATA / "sample_chart.000")
     assert "is a PLAN; `check`" in refused(capsys, "report", plan, "--track", plan)
     assert "is a PLAN; `check`" in refused(capsys, "replan", plan, "--state", plan)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "usage", "words"),
+    [
+        (["init", "-o", ""], True, "there is no path"),
+        (["init", "-o", "FILE/site.geojson"], False, "/FILE is a file"),
+        (["check", "FILE"], False, "FILE: is empty"),
+        (["triage", "--generate", "1", "--field", "1e9", "1e9"], True, "is not in the range"),
+        (["export", "PLAN", "--to", ""], True, "--to names no format; known: csv"),
+        (["export", "PLAN", "--to", "qgc-wpl", "--altitude", "amsl", "--ground", "1e9"], True, "is not in the range"),
+        (["report", "PLAN", "--track", "usv-1="], False, "--track usv-1=: there is no path"),
+    ],
+)
+def test_slips_of_a_newcomer(tmp_path, capsys, monkeypatch, arguments, usage, words):
+    """What is empty, no folder or beyond all bounds is told as that."""
+    monkeypatch.chdir(tmp_path)
+    Path("FILE").touch()
+    if "PLAN" in arguments:
+        write_plan(cover(read_scenario(DATA / "dalian_harbour.geojson"), placement="none"), "PLAN")
+    assert words in refused(capsys, *arguments, usage=usage)
 
 
 def test_a_name_too_long_for_a_file(tmp_path, capsys):

@@ -55,6 +55,13 @@ def test_same_seed_same_trajectory(mow):
     assert first != other
 
 
+@pytest.mark.parametrize("weather", [{"current": (1e9, 0.0)}, {"gusts": 100.0}])
+def test_weather_in_which_no_model_holds_is_refused(mow, weather):
+    """What throws a vessel out of all bounds is one clear line that names it, not a report."""
+    with pytest.raises(InputError, match=r"otter-?\d?: its model does not hold in such weather"):
+        simulate(mow("otter"), **weather)
+
+
 def test_wrong_options_are_one_line(mow):
     """Unknown limits and odd steps are refused before anything is simulated."""
     with pytest.raises(InputError, match="did you mean 'collisions'"):
