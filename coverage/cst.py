@@ -40,7 +40,7 @@ def constrained_tour(parent: np.ndarray, guards: np.ndarray, graph: Graph) -> li
     tour, at = [walk[0]], 0
     wanted.discard(walk[0])
     while at < len(walk) - 1:
-        go_on("walking around the trees")
+        go_on("the walk around the trees")
         goal = next((i for i in range(at + 1, len(walk)) if walk[i] in wanted), len(walk) - 1)
         here = walk[at]
         around = set(graph.indices[graph.starts[here] : graph.starts[here + 1]].tolist())

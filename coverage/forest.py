@@ -83,7 +83,7 @@ def grow(
         left, moved, tick = _grow(*graph, guard, parents, ticks, visited, last, turns, tick)
         if not left or not moved:
             return not left
-        go_on("growing trees to the guards")
+        go_on("the growth of trees to the guards")
 
 
 def prune(forest: Forest, robots: np.ndarray | None = None, seen: np.ndarray | None = None) -> Forest:

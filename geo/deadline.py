@@ -88,7 +88,7 @@ def abandoning(advice: str) -> Iterator[None]:
 def go_on(what: str) -> None:
     """Return if there is time for `what`, in the user's words. At the limit raises OutOfTimeError within `abandoning`."""
     if _ADVICE.get() and time_is_up(what):
-        text = f"{cause()} while {what}, before there was any result; {_ADVICE.get()}"
+        text = f"{cause()}: it ended {what}, before there was any result; {_ADVICE.get()}"
         raise OutOfTimeError(text, interrupted=cause() == "interrupted")
 
 

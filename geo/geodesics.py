@@ -62,7 +62,7 @@ def geodesics(space: Polygon | MultiPolygon, places: np.ndarray) -> Geodesics:
     out = csr_array((np.maximum(away, 1e-12), corner, starts), shape=(k, n))  # no length would be no link
     for begin in range(0, k, SOURCES):
         if begin:
-            go_on(f"finding ways between {k:,} places around {n:,} corners")
+            go_on(f"the search for ways between {k:,} places around {n:,} corners")
         some = slice(begin, begin + SOURCES)
         rows = out[some]
         graph = block_array([[roads.links, None], [rows, csr_array((rows.shape[0],) * 2)]], format="csr")
@@ -96,7 +96,7 @@ def _roads(space: Polygon | MultiPolygon) -> _Roads:
     number[vertices] = np.arange(len(vertices))
     pairs = []
     for begin in range(0, len(corners), BATCH):
-        go_on(f"finding ways between {len(corners):,} corners of obstacles and borders")
+        go_on(f"the search for ways between {len(corners):,} corners of obstacles and borders")
         starts, seen = visible_vertices(mesh, corners[begin : begin + BATCH])
         rows, columns = np.repeat(np.arange(begin, begin + len(starts) - 1), np.diff(starts)), number[seen]
         used = (columns >= 0) & (columns != rows)

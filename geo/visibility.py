@@ -31,7 +31,7 @@ def visibility_polygons(
     reach = ranges / np.cos(np.pi / DISC_SIDES) if outer else ranges
     views = [_polygons(mesh, points[:BATCH], reach[:BATCH])]
     for begin in range(BATCH, len(points), BATCH):
-        go_on(f"looking around from {len(points):,} places")
+        go_on(f"the look around from {len(points):,} places")
         views.append(_polygons(mesh, points[begin : begin + BATCH], reach[begin : begin + BATCH]))
     return np.concatenate(views)
 

@@ -36,7 +36,7 @@ def mend(space: Space, mesh: Triangulation, guards: np.ndarray, reach: float) ->
     inner = as_multipolygon(space.reach.buffer(-2 * HAIR))
     standing = inner if inner.area > 0.5 * space.reach.area else space.reach
     while rest:
-        go_on("adding guards for what is not seen yet")
+        go_on("the search for guards of what is not seen yet")
         piece = rest.pop(int(np.argmax(shapely.area(rest))))
         place = np.array(shapely.get_coordinates(shapely.point_on_surface(piece))[0])
         region = visibility_polygons(mesh, place, reach * (1 - 1e-3))[0].intersection(standing)

@@ -141,7 +141,7 @@ def needless(target: shapely.MultiPolygon, views: np.ndarray) -> np.ndarray:
     present = np.ones(len(views), dtype=np.bool_)
 
     def alone(i: int) -> float:
-        go_on("leaving out guards that are not needed")
+        go_on("the search for guards that are not needed")
         near = tree.query(views[i], predicate="intersects")
         others = np.sort(near[present[near] & (near != i)])
         return float(seen[i].difference(shapely.union_all(views[others])).area)

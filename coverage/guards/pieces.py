@@ -25,7 +25,7 @@ def paper_guards(space: Space, reach: float) -> np.ndarray:
     for trapezoid in trapezoids(space.target):
         stack = [trapezoid]
         while stack:
-            go_on("placing guards")
+            go_on("the placing of guards")
             piece = stack.pop()
             guard = _guard(piece, space, radius, everywhere)
             if guard is not None:

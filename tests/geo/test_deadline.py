@@ -84,12 +84,12 @@ def test_only_what_may_be_abandoned_is_at_the_limit():
     """What has no result before its end says so, with what to do; elsewhere it is finished, whatever the limit."""
     with limited(1e-9), abandoning("give it longer"):
         with pytest.raises(
-            OutOfTimeError, match="time limit while digging, before there was any result; give it longer"
+            OutOfTimeError, match="time limit: it ended the digging, before there was any result; give it longer"
         ) as told:
-            go_on("digging")
+            go_on("the digging")
         assert not told.value.interrupted
     with limited(1e-9) as limit:
-        go_on("digging")
+        go_on("the digging")
     assert limit.cut == []
     with abandoning("give it longer"):
-        go_on("digging")
+        go_on("the digging")

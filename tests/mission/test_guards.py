@@ -206,7 +206,10 @@ def test_a_plan_that_skips_a_guard_does_not_pass_the_check() -> None:
 
 def test_a_limit_before_the_first_tours_is_told_in_a_line() -> None:
     """There is no plan without guards and tours past them: the line says what was being done, and what to do."""
-    with limited(1e-9), pytest.raises(OutOfTimeError, match=r"^time limit while placing guards, .*; give it longer"):
+    with (
+        limited(1e-9),
+        pytest.raises(OutOfTimeError, match=r"^time limit: it ended the placing of guards, .*; give it longer"),
+    ):
         plan_guards(scenario((10.0, 10.0)), range=20.0)
 
 
