@@ -3,7 +3,6 @@
 import numpy as np
 
 from quarterdeck.coverage.graph import Graph
-from quarterdeck.geo.deadline import go_on
 
 
 def doubled(parent: np.ndarray, points: np.ndarray) -> list[int]:
@@ -40,7 +39,6 @@ def constrained_tour(parent: np.ndarray, guards: np.ndarray, graph: Graph) -> li
     tour, at = [walk[0]], 0
     wanted.discard(walk[0])
     while at < len(walk) - 1:
-        go_on("the walk around the trees")
         goal = next((i for i in range(at + 1, len(walk)) if walk[i] in wanted), len(walk) - 1)
         here = walk[at]
         around = set(graph.indices[graph.starts[here] : graph.starts[here + 1]].tolist())

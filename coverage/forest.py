@@ -12,7 +12,7 @@ from quarterdeck.geo.deadline import go_on
 
 ROOT, ABSENT = -2, -1
 NEVER = np.iinfo(np.int64).max
-ROUNDS = 16  # of turns, between two looks at the limit
+ROUNDS = 128  # of turns, between two looks at the limit
 TIE = 1e-9  # relative: guards this near to equally far are a tie
 
 

@@ -96,7 +96,8 @@ def _roads(space: Polygon | MultiPolygon) -> _Roads:
     number[vertices] = np.arange(len(vertices))
     pairs = []
     for begin in range(0, len(corners), BATCH):
-        go_on(f"the search for ways between {len(corners):,} corners of obstacles and borders")
+        if begin:
+            go_on(f"the search for ways between {len(corners):,} corners of obstacles and borders")
         starts, seen = visible_vertices(mesh, corners[begin : begin + BATCH])
         rows, columns = np.repeat(np.arange(begin, begin + len(starts) - 1), np.diff(starts)), number[seen]
         used = (columns >= 0) & (columns != rows)

@@ -4,6 +4,8 @@ The first unites the views from triangular expansion. The second knows no triang
 the shadow of every wall. Both take the disc as an inscribed polygon, so what they call seen is seen.
 """
 
+from itertools import count
+
 import numpy as np
 import shapely
 from shapely import MultiPolygon
@@ -14,6 +16,7 @@ from quarterdeck.geo.scenario import as_multipolygon
 from quarterdeck.geo.triangulation import Triangulation
 from quarterdeck.geo.visibility import DISC_SIDES, visibility_polygons
 
+LOOK = 32  # guards, between two looks at the limit
 TOLERANCE = 1e-9  # of the target's area: less than this uncovered is rounding
 
 
@@ -35,8 +38,11 @@ def mend(space: Space, mesh: Triangulation, guards: np.ndarray, reach: float) ->
     smallest = (reach / 64) ** 2
     inner = as_multipolygon(space.reach.buffer(-2 * HAIR))
     standing = inner if inner.area > 0.5 * space.reach.area else space.reach
-    while rest:
-        go_on("the search for guards of what is not seen yet")
+    for turn in count():
+        if not rest:
+            break
+        if turn % LOOK == LOOK - 1:
+            go_on("the search for guards of what is not seen yet")
         piece = rest.pop(int(np.argmax(shapely.area(rest))))
         place = np.array(shapely.get_coordinates(shapely.point_on_surface(piece))[0])
         region = visibility_polygons(mesh, place, reach * (1 - 1e-3))[0].intersection(standing)

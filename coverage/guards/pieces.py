@@ -10,6 +10,7 @@ from quarterdeck.geo.deadline import go_on
 from quarterdeck.geo.visibility import DISC_SIDES
 
 SNAP = 1e-12  # of the extent: the grid on which trapezoids are cut
+LOOK = 256  # trapezoids, between two looks at the limit
 SMALLEST = 1 / 64  # of the range: a piece of this size that robots cannot enter is left to be seen from elsewhere
 
 
@@ -22,10 +23,11 @@ def paper_guards(space: Space, reach: float) -> np.ndarray:
     everywhere = space.reach.equals(space.target)
     shapely.prepare(space.reach)
     guards = []
-    for trapezoid in trapezoids(space.target):
+    for i, trapezoid in enumerate(trapezoids(space.target)):
+        if i % LOOK == LOOK - 1:
+            go_on("the placing of guards")
         stack = [trapezoid]
         while stack:
-            go_on("the placing of guards")
             piece = stack.pop()
             guard = _guard(piece, space, radius, everywhere)
             if guard is not None:

@@ -16,6 +16,7 @@ from quarterdeck.mission.guard_check import unproved
 from quarterdeck.mission.guards import plan_guards
 from quarterdeck.mission.mission import Mission
 from quarterdeck.mission.planfile import plan_text
+from quarterdeck.reproduce.guard_maps import random_room, scenario_on
 
 BORDER = shapely.box(0, 0, 60, 40)
 PILLARS = (shapely.box(10, 10, 20, 30), shapely.Polygon([(30, 5), (50, 8), (45, 20)]), shapely.box(30, 28, 50, 34))
@@ -205,12 +206,13 @@ def test_a_plan_that_skips_a_guard_does_not_pass_the_check() -> None:
 
 
 def test_a_limit_before_the_first_tours_is_told_in_a_line() -> None:
-    """There is no plan without guards and tours past them: the line says what was being done, and what to do."""
+    """There is no plan without guards and tours past them: where they are many, the line says what was being done."""
+    site = scenario_on(random_room(1000, 0), 1)
     with (
         limited(1e-9),
         pytest.raises(OutOfTimeError, match=r"^time limit: it ended the placing of guards, .*; give it longer"),
     ):
-        plan_guards(scenario((10.0, 10.0)), range=20.0)
+        plan_guards(site, range=20.0)
 
 
 def test_a_limit_in_any_later_stage_leaves_the_paper_s_plan(monkeypatch) -> None:
