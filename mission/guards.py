@@ -73,7 +73,7 @@ def plan_guards(
         tours = paper if paper_will_do else _optimised(scenario, seeable, mesh, paper, team, seed)
         least = guards_bound(seeable, mesh, reach, seed=seed)
     reasons = [] if unseen.is_empty else [Reason(f"{unseen.area:.6g} m2 cannot be seen from where the vehicles may be")]
-    mission = guards_mission(scenario, space, mesh, tours, team, reasons)
+    mission = guards_mission(scenario, space, mesh, tours, team, reasons, proved=tours is paper and unseen.is_empty)
     compared = {"guards": len(paper.guards), "makespan": paper.makespan, "bound": paper.bound}
     return replace(
         mission,

@@ -17,13 +17,34 @@ from quarterdeck.geo.triangulation import Triangulation
 from quarterdeck.geo.visibility import DISC_SIDES, visibility_polygons
 
 LOOK = 32  # guards, between two looks at the limit
+MANY = 2048  # views: more are united box by box,
+A_BOX = 128  # each with about so many guards in it
 TOLERANCE = 1e-9  # of the target's area: less than this uncovered is rounding
 
 
 def uncovered(space: Space, views: np.ndarray) -> MultiPolygon:
     """Return the part of the target in none of the views; empty if it is less than TOLERANCE of it."""
-    rest = as_multipolygon(space.target.difference(shapely.union_all(views)))
+    if len(views) <= MANY:
+        rest = as_multipolygon(space.target.difference(shapely.union_all(views)))
+    else:
+        rest = as_multipolygon(shapely.union_all(_left(space.target, views)))
     return MultiPolygon() if rest.area <= TOLERANCE * space.target.area else rest
+
+
+def _left(target: MultiPolygon, views: np.ndarray) -> list[shapely.Geometry]:
+    """Return what of the target is in none of the views, box by box: one union of thousands cannot be abandoned."""
+    tree = shapely.STRtree(views)
+    west, south, east, north = target.bounds
+    side = int(np.ceil(np.sqrt(len(views) / A_BOX)))
+    x, y = np.linspace(west, east, side + 1), np.linspace(south, north, side + 1)
+    left = []
+    for i in range(side):
+        for j in range(side):
+            go_on("the proof that guards see everything")
+            box = shapely.box(x[i], y[j], x[i + 1], y[j + 1])
+            near = views[np.sort(tree.query(box, predicate="intersects"))]
+            left.append(target.intersection(box).difference(shapely.union_all(near)))
+    return left
 
 
 def mend(space: Space, mesh: Triangulation, guards: np.ndarray, reach: float) -> tuple[np.ndarray, MultiPolygon]:
