@@ -83,10 +83,13 @@ def _row(panel: Axes, y: float, size: float, texts: tuple[str, ...], *, weight: 
 
 def legend(panel: Axes, signs: Sequence[Sign]) -> float:
     """Say what the map's lines, signs and fills are: of those that it has alone. Return its top, as a part of the panel."""
-    shown = panel.legend(handles=list(signs), loc="lower left", ncols=2, fontsize=7, frameon=False, borderaxespad=0.0,
-                         columnspacing=1.2, handletextpad=0.6)  # fmt: skip
-    box = shown.get_window_extent()
-    return float(panel.transAxes.inverted().transform((box.x0, box.y1))[1])
+    for columns in (2, 1):
+        shown = panel.legend(handles=list(signs), loc="lower left", ncols=columns, fontsize=7, frameon=False,
+                             borderaxespad=0.0, columnspacing=1.2, handletextpad=0.6)  # fmt: skip
+        (left, _), (right, top) = panel.transAxes.inverted().transform(shown.get_window_extent())
+        if right - left <= 1.0:
+            break
+    return float(top)
 
 
 def happenings(panel: Axes, lines: Sequence[tuple[str, str]], low: float, high: float) -> None:

@@ -87,4 +87,4 @@ def found(chart: Axes, site: Site, followed: Mission) -> list[Sign]:
     look: dict[str, Any] = {"facecolor": "none", "edgecolor": "#7a0177", "hatch": "xxxx", "linewidth": 0.8}
     for obstacle in new:
         fill(chart, obstacle.polygon, **look, zorder=3.5)
-    return [Patch(**look, label="wreck or find, kept clear of")] if new else []
+    return [Patch(**look, label="wreck or find")] if new else []

@@ -54,7 +54,7 @@ def site(chart: Axes, mission: Mission, strange: Sequence[Obstacle] = ()) -> lis
     kinds: dict[str, dict[str, Any]] = {
         "obstacle": {"facecolor": OBSTACLE, "edgecolor": SITE["obstacle"]},
         "not covered, may be crossed": {"facecolor": "none", "edgecolor": SITE["obstacle"], "hatch": "////"},
-        "obstacle that the plan did not know": {"facecolor": STRANGE, "edgecolor": STRANGE},
+        "obstacle not in the plan": {"facecolor": STRANGE, "edgecolor": STRANGE},
     }
     seen = set()
     for obstacle in there.obstacles:

@@ -35,6 +35,13 @@ def test_every_vehicle_is_seen(make_fleet, frame):
 
 def told(png_of, *args, **options):
     """Return the texts of the legend and of the map that a picture is drawn with."""
+    chart, panel = drawn_by(png_of, *args, **options).axes
+    written = [text.get_text() for text in (*chart.texts, *panel.texts)]
+    return {text.get_text() for text in panel.get_legend().get_texts()}, written
+
+
+def drawn_by(png_of, *args, **options):
+    """Return the figure that a picture is drawn with."""
     figures = []
     original = Figure.savefig
 
@@ -45,9 +52,7 @@ def told(png_of, *args, **options):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Figure, "savefig", keep)
         png_of(*args, **options)
-    chart, panel = figures[0].axes
-    written = [text.get_text() for text in (*chart.texts, *panel.texts)]
-    return {text.get_text() for text in panel.get_legend().get_texts()}, written
+    return figures[0]
 
 
 def test_the_legend_has_what_is_drawn_and_nothing_else(make_fleet):
@@ -69,6 +74,20 @@ def test_the_legend_has_what_is_drawn_and_nothing_else(make_fleet):
     assert told(picture, crossed)[0] == common - {"obstacle"} | {"not covered, may be crossed"}
 
 
+def test_a_legend_of_long_names_is_not_cut(make_fleet):
+    """It stands within the picture, whatever layers are named, and lines beside it end above it."""
+    names = ("what an addon of ours calls the part that is done first", "what it calls the part that is done in the end")
+    layers = tuple(Layer(name, (box(0, 0, 9, 9),), ({"stroke": "#999999"},)) for name in names)
+    moments = tuple(Moment(float(n), "usv1", "told", 1.0, 2.0) for n in range(100))
+    figure = drawn_by(picture, replace(make_fleet(2), layers=layers), moments=moments)
+    panel = figure.axes[1]
+    box_of = panel.get_legend().get_window_extent()
+    assert box_of.x1 <= figure.bbox.x1
+    lines = [text for text in panel.texts if "lines more" in text.get_text()]
+    assert len(lines) == 1
+    assert lines[0].get_window_extent().y0 >= box_of.y1
+
+
 def test_areas_of_a_priority_have_their_names_on_the_map(make_fleet):
     """Of two areas each is named, with its priority."""
     plain = make_fleet(1)
@@ -85,7 +104,7 @@ def test_who_is_lost_and_who_takes_over_is_marked(make_fleet):
     wreck = Obstacle("wreck of usv2", Point(50.0, 50.0).buffer(5.0))
     followed = replace(plan, site=replace(plan.site, obstacles=(*plan.site.obstacles, wreck)))
     signs, written = told(picture, plan, moments=moments, followed=followed)
-    assert {"lost: where and when", "told a new route, when", "wreck or find, kept clear of"} <= signs
+    assert {"lost: where and when", "told a new route, when", "wreck or find"} <= signs
     assert {"usv2 lost 5:00", "1:05:30", "usv2 lost", "usv1 told a new route"} <= set(written)
     given_up = replace(plan, lost=(replace(plan.vehicles[0], id="usv9"),))
     assert "usv9 lost" in told(picture, given_up)[1]
