@@ -75,14 +75,24 @@ def held(edges, x, y, angle, by_centre):  # type: ignore[no-untyped-def]
         turned[e, 2] -= 2.0 * column
         turned[e, 3] -= 2.0 * row
     columns, rows = int(np.ceil(right / 2.0) - column), int(np.ceil(top / 2.0) - row)
-    free, conflicts = _by_centre(turned, rows, columns) if by_centre else _by_moves(turned, rows, columns)
-    count, first_row, last_row, first_column, last_column = -conflicts, rows, -1, columns, -1
+    first, start, stop = _runs_by_centre(turned, rows) if by_centre else _runs_by_moves(turned, rows)
+    begin = np.zeros(len(start) + 1, np.int64)
+    begin[1:] = np.cumsum(stop - start)
+    free = np.ones(begin[-1], np.uint8)
+    conflicts = 0 if by_centre else _part(turned, first, start, stop, begin, free)
+    count = int(free.sum()) - conflicts
+    first_row, last_row, first_column, last_column = rows, -1, columns, -1
     for r in range(rows):
-        for c in range(columns):
-            if free[r, c]:
-                count += 1
+        for n in range(first[r], first[r + 1]):
+            low, high = begin[n], begin[n + 1] - 1
+            while low <= high and not free[low]:
+                low += 1
+            while low < high and not free[high]:
+                high -= 1
+            if low <= high:
                 first_row, last_row = min(first_row, r), r
-                first_column, last_column = min(first_column, c), max(last_column, c)
+                first_column = min(first_column, start[n] + low - begin[n])
+                last_column = max(last_column, start[n] + high - begin[n])
     if last_row < 0:
         return count, right - left, top - bottom, np.nan, np.nan
     margin_x = (right - 2.0 * (column + last_column + 1)) - (2.0 * (column + first_column) - left)
@@ -91,27 +101,49 @@ def held(edges, x, y, angle, by_centre):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True)
-def _by_moves(edges, rows, columns):  # type: ignore[no-untyped-def]
-    """Return the (rows, columns) hypervertices with all four moves inside, and how many adjacent pairs are parted."""
-    first, x = crossings(edges, 2 * rows)
-    free = np.zeros((rows, columns), np.uint8)
-    beside = np.zeros((rows, columns), np.uint8)  # a gap lies between this one and the next column's
-    above = np.zeros((rows, columns), np.uint8)
+def _runs_by_moves(edges, rows):  # type: ignore[no-untyped-def]
+    """Return runs of hypervertices whose moves along the rows are inside, row after row: `first` (rows + 1,) of each row,
+    and the columns from `start` to `stop`, excluded, of each. What is held is less than its box, of which thus no array is
+    made.
+    """
+    cross, x = crossings(edges, 2 * rows)
+    first, start, stop = np.zeros(rows + 1, np.int64), np.empty(len(x), np.int64), np.empty(len(x), np.int64)
+    count = 0
     for r in range(rows):
-        a, b, last = first[2 * r], first[2 * r + 1], -2
-        while a + 1 < first[2 * r + 1] and b + 1 < first[2 * r + 2]:
-            start = int(np.ceil((max(x[a], x[b]) - 0.5) / 2.0))
-            stop = int(np.floor((min(x[a + 1], x[b + 1]) - 1.5) / 2.0)) + 1
-            if start < stop:
-                for c in range(start, stop):
-                    free[r, c] = 1
-                if start == last + 1:
-                    beside[r, last] = 1
-                last = stop - 1
+        a, b = cross[2 * r], cross[2 * r + 1]
+        while a + 1 < cross[2 * r + 1] and b + 1 < cross[2 * r + 2]:
+            start[count] = int(np.ceil((max(x[a], x[b]) - 0.5) / 2.0))
+            stop[count] = int(np.floor((min(x[a + 1], x[b + 1]) - 1.5) / 2.0)) + 1
+            count += start[count] < stop[count]
             if x[a + 1] < x[b + 1]:
                 a += 2
             else:
                 b += 2
+        first[r + 1] = count
+    return first, start[:count], stop[:count]
+
+
+@nb.njit(cache=True)
+def _runs_by_centre(edges, rows):  # type: ignore[no-untyped-def]
+    """Return runs, as `_runs_by_moves` does, of hypervertices whose centre is inside."""
+    first, x = crossings(edges / 2.0, rows)
+    start, stop = np.empty(len(x), np.int64), np.empty(len(x), np.int64)
+    runs, count = np.zeros(rows + 1, np.int64), 0
+    for r in range(rows):
+        for at in range(first[r], first[r + 1] - 1, 2):
+            start[count], stop[count] = int(np.ceil(x[at] - 0.5)), int(np.ceil(x[at + 1] - 0.5))
+            count += start[count] < stop[count]
+        runs[r + 1] = count
+    return runs, start[:count], stop[:count]
+
+
+@nb.njit(cache=True)
+def _part(edges, first, start, stop, begin, free):  # type: ignore[no-untyped-def]
+    """Take from the `free` of the runs, of which each has its own from `begin` on, those that an edge crosses; return how
+    many adjacent pairs of what is left are parted.
+    """
+    seen = np.zeros(len(free), np.bool_)
+    above = [(0, 0, 0) for _ in range(0)]  # a gap lies between the one there, in this row and column, and the next row's
     for e in range(len(edges)):
         x0, y0, x1, y1 = edges[e]
         if x0 == x1:
@@ -119,29 +151,38 @@ def _by_moves(edges, rows, columns):  # type: ignore[no-untyped-def]
         slope = (y1 - y0) / (x1 - x0)
         for j in range(int(np.ceil(min(x0, x1) - 0.5)), int(np.floor(max(x0, x1) - 0.5)) + 1):
             line = int(np.floor(y0 + (j + 0.5 - x0) * slope - 0.5))  # the move up from this line is crossed
-            if line % 2 == 0:
-                free[line // 2, j // 2] = 0
-            elif line > 0:
-                above[line // 2, j // 2] = 1
-    conflicts = 0
-    for r in range(rows):
-        for c in range(columns):
-            if free[r, c]:
-                conflicts += beside[r, c] and free[r, c + 1]
-                conflicts += above[r, c] and r + 1 < rows and free[r + 1, c]
-    return free, conflicts
+            at = _place(first, start, stop, begin, line // 2, j // 2) if line >= 0 else -1
+            if at >= 0 and line % 2 == 0:
+                free[at] = 0
+            elif at >= 0 and not seen[at]:
+                seen[at] = True
+                above.append((at, line // 2, j // 2))
+    parted = 0
+    for at, row, column in above:
+        other = _place(first, start, stop, begin, row + 1, column)
+        parted += free[at] * free[other] if other >= 0 else 0
+    for r in range(len(first) - 1):
+        for n in range(first[r], first[r + 1] - 1):
+            if stop[n] == start[n + 1]:
+                parted += free[begin[n + 1] - 1] * free[begin[n + 1]]
+    return parted
 
 
 @nb.njit(cache=True)
-def _by_centre(edges, rows, columns):  # type: ignore[no-untyped-def]
-    """Return the (rows, columns) hypervertices whose centre is inside, and 0."""
-    first, x = crossings(edges / 2.0, rows)
-    free = np.zeros((rows, columns), np.uint8)
-    for r in range(rows):
-        for at in range(first[r], first[r + 1] - 1, 2):
-            for c in range(int(np.ceil(x[at] - 0.5)), int(np.ceil(x[at + 1] - 0.5))):
-                free[r, c] = 1
-    return free, 0
+def _place(first, start, stop, begin, row, column):  # type: ignore[no-untyped-def]
+    """Return where a hypervertex stands among those of all runs; -1 if it is in none."""
+    if row >= len(first) - 1:
+        return -1
+    low, high = first[row], first[row + 1]
+    while low < high:  # the first run that stops beyond it
+        middle = (low + high) // 2
+        if stop[middle] <= column:
+            low = middle + 1
+        else:
+            high = middle
+    if low == first[row + 1] or start[low] > column:
+        return -1
+    return begin[low] + column - start[low]
 
 
 @nb.njit(cache=True)

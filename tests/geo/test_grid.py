@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import MultiPolygon, Polygon, box
 
-from quarterdeck.geo.grid import lay_grid
+from quarterdeck.geo.grid import area_edges, lay_grid
+from quarterdeck.geo.scanline import held
 from quarterdeck.geo.scenario import as_multipolygon
 
 
@@ -92,3 +93,14 @@ def test_strip_thinner_than_half_a_cell_has_no_moves():
     grid = lay_grid(area, 10.0, 0.0, (0.0, 0.0))
     assert not grid.cells[:5].any()
     assert not grid.right[:5].any()
+
+
+def test_what_a_lattice_holds_takes_no_more_than_the_area_has():
+    """Two squares a thousand kilometres apart, whose box has a million million cells: each holds what it would alone."""
+    far = 1_000_000.0
+    squares = [box(0, 0, 8, 8), box(far, far, far + 8, far + 8)]
+    both = np.concatenate([area_edges(MultiPolygon([square]), 1.0) for square in squares])
+    count, width, _, margin_x, _ = held(both, 0.0, 0.0, 0.0, False)
+    assert count == 2 * held(area_edges(MultiPolygon(squares[:1]), 1.0), 0.0, 0.0, 0.0, False)[0] > 0
+    assert width == pytest.approx(far + 8, abs=2)
+    assert margin_x == pytest.approx(0.0, abs=1e-6)
