@@ -21,7 +21,7 @@ from quarterdeck.mission.mission import Mission, Route
 from quarterdeck.mission.reason import ImpossibleError, Reason
 from quarterdeck.mission.timing import RESERVE, shortfalls
 from quarterdeck.mission.tours.paper import paper_search
-from quarterdeck.mission.tours.problem import SHAPES, Problem, problem
+from quarterdeck.mission.tours.problem import SHAPES, Problem, closure, problem
 from quarterdeck.mission.tours.search import ITERATIONS, Solution, search
 from quarterdeck.mission.travel import Travel, reachable, travel, usable
 
@@ -138,6 +138,11 @@ def refusals(scenario: Scenario) -> Iterator[InputError]:
         blocks = [o for o in scenario.site.obstacles if o.polygon.contains(Point(task.position))]
         if able and blocks and all(any(v.domain in o.blocks for o in blocks) for v in able):
             yield _impossible(task, f"is inside obstacle {blocks[0].id!r}; move it out")
+    after = [(ids.index(a.task), i, False) for i, task in enumerate(tasks) for a in task.after if a.task in ids]
+    try:
+        closure(len(tasks), after, [repr(i) for i in ids])
+    except InputError as error:
+        yield error
 
 
 def _impossible(task: Task, why: str) -> ImpossibleError:

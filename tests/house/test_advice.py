@@ -85,6 +85,18 @@ def test_what_assign_refuses_is_a_problem(capsys, tmp_path):
     assert out.count("needs drill; no vehicle is and can") == 5
 
 
+def test_tasks_in_a_circle_are_a_problem(capsys, tmp_path):
+    """Two tasks that wait for each other are named before anything is assigned."""
+
+    def change(features):
+        first, second = [f for f in features if f["properties"]["role"] == "task"][:2]
+        first["properties"]["after"], second["properties"]["after"] = [second["id"]], [first["id"]]
+
+    status, out, _ = checked(capsys, tmp_path, "inspection_hall", change)
+    assert status == 2
+    assert "tasks wait for each other in a circle" in out
+
+
 def test_guards_need_no_spacing(capsys, tmp_path):
     """Where all vehicles have a range the site can be planned as it is, by guards: that is a note."""
 
