@@ -15,8 +15,8 @@ INTRODUCTION = """# The GeoJSON that you write
 Made by `make docs` from `geo/properties.py`; the JSON Schema is `geo/site.schema.json` and ships with the package.
 
 A site is a FeatureCollection (RFC 7946) in WGS84, longitude before latitude. Draw it in QGIS, geojson.io or beside a chart,
-and give each feature a `role`. `quarterdeck check SITE` lists every problem with its place, and what `plan` or `assign` would
-refuse; `quarterdeck init` writes a sample to start from.
+and give each feature a `role`. `quarterdeck check SITE` lists every problem with its place, and what `plan` or `assign`
+would refuse; `quarterdeck init` writes a sample to start from.
 
 What is repaired silently: ring direction, repeated vertices, obstacles that overlap each other or the border. What is
 refused, because what was meant is not known: a ring that is unclosed or crosses itself, fewer than 4 positions, a `crs`
