@@ -1,6 +1,7 @@
 """Time limits and Ctrl-C at the command line: what there is by then is kept, and told."""
 
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -119,7 +120,7 @@ def test_ways_between_tasks_end_at_a_time_limit(tmp_path, capsys):
     assert status("assign", site, "--time-limit", "0.001", "-o", path) == 2
     said = capsys.readouterr().err.splitlines()
     assert len(said) == 1
-    assert "time limit: it ended the search for ways after 0 of 36 between tasks and depots" in said[0]
+    assert re.search(r"time limit: it ended the search for ways after \d+ of 36 between tasks and depots", said[0])
     assert not path.exists()
 
 
