@@ -55,7 +55,7 @@ def trapezoids(polygon: Polygon | MultiPolygon) -> list[np.ndarray]:
 
 
 def _verticals(polygon: Polygon | MultiPolygon, hair: float) -> np.ndarray:
-    """Return the (n, 2, 2) verticals in a polygon from each corner to the nearest edge below it and above it."""
+    """Return the (n, 2, 2) verticals in a polygon from each corner to the nearest edges, and its upright edges."""
     places, ring = shapely.get_coordinates(shapely.get_parts(polygon.boundary), return_index=True)
     edges = np.hstack([places[:-1], places[1:]])[ring[:-1] == ring[1:]]
     edges = np.where((edges[:, 0] <= edges[:, 2])[:, None], edges, edges[:, [2, 3, 0, 1]])
@@ -67,8 +67,11 @@ def _verticals(polygon: Polygon | MultiPolygon, hair: float) -> np.ndarray:
     shapely.prepare(polygon)
     inside = np.isfinite(other)
     inside[inside] = shapely.contains_xy(polygon, x[inside], (y[inside] + other[inside]) / 2)
-    x, low, high = x[inside], np.minimum(y, other)[inside], np.maximum(y, other)[inside]
-    return np.stack([np.column_stack([x, low]), np.column_stack([x, high])], axis=1)
+    upright = edges[edges[:, 0] == edges[:, 2]]
+    x, y, other = (
+        np.concatenate(p) for p in zip((x[inside], y[inside], other[inside]), upright[:, [0, 1, 3]].T, strict=True)
+    )
+    return np.stack([np.column_stack([x, np.minimum(y, other)]), np.column_stack([x, np.maximum(y, other)])], axis=1)
 
 
 @njit(cache=True)
