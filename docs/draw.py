@@ -87,11 +87,16 @@ COMMANDS = {
     ],
     "sensing": [
         "plan data/plant_yard.geojson --method lines --spacing 8 -o plan.geojson",
-        "simulate plan.geojson --lidar --unmapped crates.geojson --picture sensing.png",
+        "simulate plan.geojson --lidar --unmapped trucks.geojson --picture sensing.png",
         "sensing.png",
     ],
 }
-CRATES = [(8.54183302, 47.37705425), (8.54218647, 47.37712326), (8.5418151, 47.37661845), (8.5419467, 47.37668102)]
+TRUCKS = {  # middles, with metres along the yard and across
+    (8.54183302, 47.37705425): (2, 14),
+    (8.54218647, 47.37712326): (8, 8),
+    (8.5418151, 47.37661845): (2, 18),
+    (8.5419467, 47.37668102): (12, 4),
+}
 
 
 @click.command()
@@ -111,7 +116,7 @@ def by_commands(commands: list[str]) -> bytes:
     *lines, picture = commands
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         Path("data").symlink_to(DATA)
-        Path("crates.geojson").write_text(json.dumps(crates()), encoding="utf-8")
+        Path("trucks.geojson").write_text(json.dumps(trucks()), encoding="utf-8")
         Path("harbour.geojson").write_text(harbour(), encoding="utf-8")
         for line in lines:
             with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):
@@ -133,12 +138,15 @@ def harbour() -> str:
     return (HERE / "tutorials" / "survey.md").read_text(encoding="utf-8").split("```json\n")[1].split("```")[0]
 
 
-def crates() -> dict[str, object]:
-    """Return crates that stand on the yard and in no plan, as GeoJSON."""
+def trucks() -> dict[str, object]:
+    """Return trucks that stand on the yard and in no plan, as GeoJSON."""
     features = []
-    for i, (lon, lat) in enumerate(CRATES):
-        ring = [[lon + 1.3e-5 * a, lat + 0.9e-5 * b] for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))]
-        properties = {"role": "obstacle", "id": f"crate-{i + 1}"}
+    for i, ((lon, lat), (length, width)) in enumerate(TRUCKS.items()):
+        ring = [
+            [lon + 0.65e-5 * length * a, lat + 0.45e-5 * width * b]
+            for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))
+        ]
+        properties = {"role": "obstacle", "id": f"truck-{i + 1}"}
         features.append(
             {"type": "Feature", "properties": properties, "geometry": {"type": "Polygon", "coordinates": [ring]}}
         )

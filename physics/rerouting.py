@@ -7,10 +7,11 @@ range of others' eyes needs none to be seen.
 
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 
 import numpy as np
 import shapely
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import distance_transform_edt, label
 from shapely import LineString
 
 from quarterdeck.geo.gridpath import find_ways, nearest_free
@@ -31,6 +32,7 @@ STANDS, MOVED = 10.0, 0.3  # s in which a robot that is under way and has not mo
 QUEUE = 300.0  # s for which it lets others keep it from its way
 YIELDS = 10.0  # s that one that made room waits there
 ROOM = 1.25  # times as far off another robot as two may come, a way around it, or out of its way, keeps
+NEAR = 3.0  # m: who has stalled on a leg stands so near to what is in its way
 PLACES = 12  # that are looked at to make room
 
 
@@ -140,12 +142,13 @@ class Rerouting:
 
         `done` of its `command`'s waypoints are reached, `ahead` are those that it now makes for. Its way is looked at when
         the command is `fresh`, and against what was found; when it has `stalled`, or stood still for STANDS, it looks for a
-        way around the `others` too: of each the (q, 2) places where it is and is going. To a place where one stays it goes
-        as near as it may. If there is no way, it makes room for them, the last in the list first, and comes back. Who makes
-        no map keeps to its waypoints, from the next past the others on, and waits for as long as it takes.
+        way around the `others` too: of each the (q, 2) places where it is and is going. It comes back to its survey leg
+        past what is in its way. To a place where one stays it goes as near as it may. If there is no way, it makes room for
+        them, the last in the list first, and comes back. Who makes no map keeps to its waypoints, from the next past the
+        others on, and waits for as long as it takes.
         """
         vehicle, grid = self.vehicles[i], self.findings.grid(i)
-        stop = next((j for j, w in enumerate(command[done:], done) if _to_do(w)), len(command) - 1)
+        stop = done + _next_to_do(command[done:])
         standing = self._standing(i, time, here)
         self.stalled[i] = min(self.stalled[i], time) if stalled else np.inf
         held = stalled or standing >= STANDS
@@ -165,16 +168,22 @@ class Rerouting:
         # Who is nearer to a thing than the clearance goes to the nearest place that is not, as plans do.
         reach = vehicle.clearance + 2 * grid.resolution
         first = stop if self.findings.looked else done + _past(here, command[done : stop + 1], others, float(self.room[i]))
-        for j in range(first, len(command)):
-            goal = np.array([command[j].x, command[j].y])
+        start = nearest_free(grid, free, here, reach)
+        goals = [(j, np.array([w.x, w.y])) for j, w in enumerate(command[first:], first)]
+        again = None
+        if self.findings.looked and done and command[done].leg != "transit":
+            again = _rejoined(grid, free, start[0], command[done - 1], command[done])
+            goals = [(done, again), *goals] if again is not None else goals
+        for j, goal in goals:
             taken = any(len(way) == 1 and np.hypot(*(way[0] - goal)) < self.room[i] for way in others.values())
             corner = j < stop  # which it need not be at
             within = 2 * grid.resolution if corner else reach + self.room[i] * taken
-            ends = np.concatenate([nearest_free(grid, free, here, reach), nearest_free(grid, free, goal, within)])
+            ends = np.concatenate([start, nearest_free(grid, free, goal, within)])
             path = find_ways(grid, free, ends, "octile").path(0, 1)
             if path is not None:
                 path = path[1:] if np.hypot(*(path[0] - here)) < CELL and len(path) > 2 else path
-                via = tuple(Waypoint(x, y, speed=command[j].speed) for x, y in path[:-1].tolist())
+                corners = path if goal is again else path[:-1]
+                via = tuple(Waypoint(x, y, speed=command[j].speed) for x, y in corners.tolist())
                 self.barred[i] = np.inf
                 x, y = path[-1].tolist()
                 onward = [replace(w, x=x, y=y) if _same(w, goal) else w for w in command[j:]]
@@ -249,7 +258,7 @@ class Rerouting:
 
     def _barred(self, i: int, here: np.ndarray, ahead: Sequence[Waypoint], *, fresh: bool) -> bool:
         """Whether what was found, or, on a fresh command, what is known lies in the way to where something is to do."""
-        stop = next((j for j, w in enumerate(ahead) if _to_do(w)), len(ahead) - 1)
+        stop = _next_to_do(ahead)
         points = np.array([here, *((w.x, w.y) for w in ahead[: stop + 1])])
         way, keep = LineString(points), SLACK * self.vehicles[i].clearance
         if fresh and not shapely.dwithin(shapely.Point(here), shapely.Point(points[1]), 0.5):
@@ -260,8 +269,32 @@ class Rerouting:
         return bool(len(at)) and bool(shapely.dwithin(way, shapely.MultiPoint(at), keep))
 
 
-def _to_do(waypoint: Waypoint) -> bool:
-    return waypoint.task is not None or waypoint.hold > 0 or waypoint.leg != "transit"
+def _next_to_do(ahead: Sequence[Waypoint]) -> int:
+    """Return the number of the first waypoint that must be reached: with something to do, or at an end of a survey leg."""
+    for j, (w, after) in enumerate(zip_longest(ahead, ahead[1:])):
+        if w.task is not None or w.hold > 0 or w.leg != "transit" or after is None or after.leg != "transit":
+            return j
+    return 0
+
+
+def _rejoined(grid: Occupancy, free: np.ndarray, here: np.ndarray, start: Waypoint, end: Waypoint) -> np.ndarray | None:
+    """Return the (2,) place from where the leg from `start` to `end` is driven on; None if all of it is barred.
+
+    It is the nearest to `here`; if something is in the way there or before long, the first past it. It can be reached over
+    the `free` cells (rows, cols) of the grid.
+    """
+    a, b = np.array([start.x, start.y]), np.array([end.x, end.y])
+    length = float(np.hypot(*(b - a)))
+    begin = float(np.clip((here - a) @ (b - a) / max(length, CELL), 0.0, length))
+    places = a + np.outer(np.arange(begin, length, grid.resolution), (b - a) / max(length, CELL))
+    parts, _ = label(free)
+    cells = np.clip(np.floor(grid.to_cells(np.vstack([here, places]))).astype(int), 0, np.array(free.shape) - 1)
+    part = parts[cells[:, 0], cells[:, 1]]
+    open_ = (part[1:] == part[0]) & (part[0] > 0)
+    barred = np.flatnonzero(~open_)
+    if len(barred) and barred[0] * grid.resolution < NEAR:
+        open_[: barred[0]] = False
+    return places[np.argmax(open_)] if open_.any() else None
 
 
 def _past(here: np.ndarray, ahead: Sequence[Waypoint], others: Mapping[int, np.ndarray], room: float) -> int:

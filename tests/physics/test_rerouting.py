@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from shapely import MultiPolygon, box
 
+from quarterdeck.api import plan
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.models import load_model
 from quarterdeck.geo.reader import read_obstacles, read_scenario
-from quarterdeck.geo.scenario import Obstacle, Precedence, Scenario, Site, Task, Vehicle
+from quarterdeck.geo.scenario import Area, Obstacle, Precedence, Scenario, Site, Task, Vehicle
 from quarterdeck.mission.assign import assign
 from quarterdeck.mission.mission import Waypoint
 from quarterdeck.mission.recovery import recovering
@@ -85,6 +86,18 @@ def test_around_a_closed_door_by_the_other_one():
     task = run.report.tasks[0]
     assert task.driven.arrival > task.planned.arrival + 5.0
     assert task.driven.leave - task.driven.begin == pytest.approx(5.0)
+
+
+def test_survey_lines_go_on_past_what_stands_on_them():
+    """Two trucks, one long and one wide, and a crate by the border: around them and on along the lines, 1 % not covered."""
+    model = load_model("jackal")
+    robot = Vehicle("r1", model, (1.0, 1.0), speed=1.0, clearance=0.45, battery=model.battery)
+    site = Site((Area("yard", box(0, 0, 60, 20)),), MultiPolygon([box(-2, -2, 62, 22)]), ())
+    mission = plan(Scenario("yard", Frame(8.5, 47.4), site, (robot,)), method="lines", spacing=4.0, angle=0.0)
+    trucks = [box(15, 5, 16.5, 15), box(34, 8, 46, 12), box(1, 17, 2, 19)]
+    sensing = Sensing(lidar=True, unmapped=tuple(Obstacle(f"truck {i}", t) for i, t in enumerate(trucks)))
+    report = simulate(mission, sensing=sensing, limits={"cross_track": 2.0}).report
+    assert report.passed, report.reasons
 
 
 @pytest.mark.parametrize("recover", [False, True])
