@@ -87,7 +87,7 @@ def _site(mission: Mission) -> str:
 
 def _kind(mission: Mission, obstacle: Obstacle) -> str:
     """Whether any of the vehicles has to keep out of an obstacle, or it is only not covered."""
-    return "obstacle" if obstacle.blocks & {v.domain for v in mission.vehicles} else "crossed"
+    return "obstacle" if obstacle.blocks & {v.domain for v in (*mission.vehicles, *mission.lost)} else "crossed"
 
 
 def _key(mission: Mission) -> str:

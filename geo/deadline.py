@@ -29,7 +29,7 @@ class Limit:
 
 
 _LIMIT: ContextVar[Limit | None] = ContextVar("limit", default=None)
-_ADVICE: ContextVar[str] = ContextVar("advice", default="")  # to whom nothing can be given in time
+_ADVICE: ContextVar[str] = ContextVar("advice", default="")  # what to do; "" outside `abandoning`
 
 
 @contextmanager
@@ -37,7 +37,8 @@ def limited(seconds: float | None = None, *, interruptible: Callable[[], None] |
     """Have searches and runs within end after `seconds` of `running_time`, and when what is around them has to end.
 
     With `interruptible` at the first Ctrl-C too (in the main thread, which alone hears it), when it is called to say so.
-    What cannot be cut, since there would be no result without it, still takes its time; a second Ctrl-C ends it.
+    What cannot be cut, since there would be no result without it, still takes its time, but within `abandoning`; a second
+    Ctrl-C ends it.
     """
     limit = _LIMIT.get() or Limit(math.inf)
     ended = limit.ends

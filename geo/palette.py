@@ -32,5 +32,7 @@ def colours(count: int, *, casualties: bool = False) -> list[str]:
 
 def colours_of(names: Iterable[str], *, casualties: bool = False) -> dict[str, str]:
     """Return a colour for each vehicle by name; in the names' order, numbers in them by size, so that all files agree."""
-    ordered = sorted(set(names), key=lambda name: [int(p) if p.isdecimal() else p for p in re.split(r"(\d+)", name)])
+    ordered = sorted(
+        sorted(set(names)), key=lambda name: [int(p) if p.isdecimal() else p for p in re.split(r"(\d+)", name)]
+    )
     return dict(zip(ordered, colours(len(ordered), casualties=casualties), strict=True))

@@ -227,9 +227,12 @@ def _told(plan: Mission, run: Running, heeded: Sequence[Changes], reliefs: Seque
 
 
 def _orders(run: Running, compared: Compared | None) -> list[tuple[float, str]]:
-    """Return when vehicles were told new routes, or took over others' parts: seconds and vehicles."""
-    took_over = [(e.time, e.who) for e in compared.driven.log if e.what == "takes over"] if compared else []
-    return [(t.time, t.route.vehicle) for t in tellings(run.memory)] + took_over
+    """Return when vehicles were told new routes, or took over others' parts: seconds of the run, and vehicles."""
+    told = [(t.time, t.route.vehicle) for t in tellings(run.memory)]
+    if compared is None:
+        return told
+    began = compared.driven.team.began  # the log's times are the mission's, and it tells of what was before the run too
+    return told + [(e.time - began, e.who) for e in compared.driven.log if e.what == "takes over" and e.time >= began]
 
 
 def _check(

@@ -52,3 +52,9 @@ def test_no_robot_looks_like_a_casualty():
 def test_who_is_left_keeps_the_colour_whatever_the_order():
     """Colours go by name, 2 before 10, and not by the order in a file."""
     assert colours_of(["usv10", "usv2", "usv1"]) == dict(zip(["usv1", "usv2", "usv10"], colours(3), strict=True))
+
+
+def test_names_of_the_same_number_have_an_order_of_their_own():
+    """uav01 and uav1 have the same colours in every process."""
+    names = ["uav0001", "uav001", "uav01", "uav1"]
+    assert colours_of(reversed(names)) == dict(zip(names, colours(4), strict=True))

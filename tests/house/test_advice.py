@@ -144,11 +144,12 @@ def test_a_fault_hides_no_other(capsys, tmp_path):
         v1, v2, area = (next(f for f in features if f["id"] == i) for i in ("usv-1", "usv-2", "survey"))
         v1["properties"] |= {"modell": "otter", "model": "titanic", "domain": "sea", "sensor": {"kind": "camera"}}
         v2["properties"] |= {"speed": 99, "end": [200, 0]}
+        features.append({**v2, "id": "uav", "properties": {"role": "vehicle", "domain": "arial", "speed": 12}})
         area["geometry"]["coordinates"][0].pop()
 
     _, out, _ = checked(capsys, tmp_path, "west_ant_island", change)
-    words = ("unknown property 'modell'", "domain must be one of", "unknown vehicle model 'titanic'",
-             "speed 99 m/s exceeds", "end: longitude 200", "is not closed")  # fmt: skip
+    words = ("unknown property 'modell'", "ground, aerial, not 'sea'", "unknown vehicle model 'titanic'",
+             "speed 99 m/s exceeds", "end: longitude 200", "is not closed", "did you mean 'aerial'?")  # fmt: skip
     assert [sum(word in line for line in out.splitlines()) for word in words] == [1] * len(words)
     assert len(out.splitlines()) == len(words)
 

@@ -21,6 +21,7 @@ from quarterdeck.mission.planfile import plan_text, read_plan
 from quarterdeck.mission.recorded import read_state
 from quarterdeck.mission.replan import replan
 from quarterdeck.mission.tracks import Record
+from quarterdeck.mission.triage.carry_on import planned_stand
 from quarterdeck.mission.triage.generate import generate, paper_team
 from quarterdeck.mission.triage.plan import plan_triage, run_plan
 from quarterdeck.physics.report import report_schema
@@ -211,3 +212,15 @@ def test_nobody_is_seen_behind_a_wall_or_a_hill() -> None:
     crest = Terrain((-10.0, -10.0), 0.5, np.tile(np.maximum(1.0 - np.abs(x - 16.0), 0.0), (81, 1)))
     assert not seen(scenario, crest)
     assert seen(scenario, Terrain((-10.0, -10.0), 0.5, np.zeros((81, 101))))
+
+
+def test_who_took_over_before_a_run_is_no_moment_of_it(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    """Of a drill that goes on after a section was taken over, also by one that is lost since, nothing of that is told."""
+    from quarterdeck.physics.simulate import simulate
+
+    drill = planned(read_scenario(Path(__file__).parents[2] / "data" / "triage_drill.geojson"), tmp_path)
+    progress = planned_stand(drill, 450.0, stopped={"ugv1": 20.0})
+    assert progress.stand is not None
+    assert "ugv3" in {e.who for e in progress.stand.memory.log if e.what == "takes over"}
+    for lost in ({"ugv1"}, {"ugv1", "ugv3"}):
+        assert simulate(replan(drill, progress, Changes(lost=frozenset(lost))), duration=2.0).moments == ()
