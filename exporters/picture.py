@@ -69,7 +69,7 @@ def picture(
     graticule(chart, mission.frame)
     scale_bar(chart)
     north_arrow(chart)
-    name = min(13.0, 13.0 * 40 / len(mission.name))  # points: a long name leaves room for the caption
+    name = min(13.0, 13.0 * 40 / max(len(mission.name), 1))  # points: a long name leaves room for the caption
     figure.text(0.055, 0.955, mission.name, fontsize=name, weight="bold", va="center", parse_math=False)
     figure.text(0.67, 0.955, _caption(mission, report), fontsize=8, va="center", ha="right", color="#333333")
     high = table(panel, mission, palette, report)

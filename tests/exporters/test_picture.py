@@ -33,6 +33,11 @@ def test_every_vehicle_is_seen(make_fleet, frame):
     assert all(near(image, colour) > 100 for colour in ("#0072b2", "#d55e00", "#009e73", "#cc79a7"))
 
 
+def test_a_mission_without_a_name_is_drawn(make_fleet):
+    """A site may have an empty one."""
+    assert pixels(picture(replace(make_fleet(1), name=""), width=300, height=200)).shape == (200, 300, 3)
+
+
 def told(png_of, *args, **options):
     """Return the texts of the legend and of the map that a picture is drawn with."""
     chart, panel = drawn_by(png_of, *args, **options).axes
