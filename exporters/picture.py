@@ -60,7 +60,8 @@ def picture(
     signs += layers(chart, mission, palette, run=trace is not None)
     if followed is not None:
         signs += found(chart, mission.site, followed)
-        signs += layers(chart, left_undone(followed), palette, run=True)
+        told = {sign.get_label() for sign in signs}  # the plan may have left something undone too
+        signs += [s for s in layers(chart, left_undone(followed), palette, run=True) if s.get_label() not in told]
     signs[:0] = _routes(chart, mission, palette, faint=trace is not None)
     if trace is not None:
         signs[:0] = run(chart, mission, trace, palette)

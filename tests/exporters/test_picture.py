@@ -79,6 +79,14 @@ def test_the_legend_has_what_is_drawn_and_nothing_else(make_fleet):
     assert told(picture, crossed)[0] == common - {"obstacle"} | {"not covered, may be crossed"}
 
 
+def test_what_a_plan_and_its_run_leave_undone_has_one_sign(make_fleet):
+    """A plan that leaves something undone is followed by another that does."""
+    mission = make_fleet(2)
+    mission = replace(mission, layers=(undone_layer([(box(0, 0, 5, 5), "w")]),))
+    legend = drawn_by(picture, mission, followed=mission).axes[1].get_legend()
+    assert [text.get_text() for text in legend.get_texts()].count("undone") == 1
+
+
 def test_a_legend_of_long_names_is_not_cut(make_fleet):
     """It stands within the picture, whatever layers are named, and lines beside it end above it."""
     names = ("what an addon of ours calls the part that is done first", "what it calls the part that is done in the end")
