@@ -176,7 +176,7 @@ def _distribution(kind: Kind, name: str, value: dict[str, Any]) -> dict[str, tup
     form, (a, b) = next(iter(value)), pair
     if (form == "uniform" and a > b) or (form == "normal" and b < 0):
         raise InputError(f"{kind.table}.{name}: {form} = {pair} is the wrong way round")
-    return {form: (float(a), float(b))}
+    return {form: (a + 0.0, b + 0.0)}  # 0.0 of -0.0, at which numpy takes the range for a negative one
 
 
 def _whole(document: dict[str, Any], name: str, least: int, default: int) -> int:

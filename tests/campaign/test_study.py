@@ -57,6 +57,12 @@ def test_drawn_speeds_are_never_negative(study: Writer) -> None:
     assert not any(math.copysign(1, g) < 0 for g in gusts)
 
 
+def test_a_range_of_nothing_draws_its_one_value(study: Writer) -> None:
+    """Minus zero is no less than zero."""
+    (case,) = cases(read_study(study("runs = 1\n[conditions]\ncurrent_speed = { uniform = [0, -0.0] }\n")))
+    assert case.current == (0.0, 0.0)
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [
