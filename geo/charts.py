@@ -5,13 +5,12 @@ chart's coverage. Object classes and attributes: IHO S-57 edition 3.1, Appendix 
 what a chart does not show, a survey vessel finds.
 """
 
-import warnings
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import shapely
@@ -22,6 +21,7 @@ from shapely.ops import unary_union
 
 from quarterdeck.geo.errors import InputError, UnavailableError
 from quarterdeck.geo.frame import Frame
+from quarterdeck.geo.s57 import Layer, read_layers
 from quarterdeck.geo.scenario import Area, Obstacle, Scenario, Site, Vehicle, as_multipolygon
 
 DEPTHS = ("DEPARE", "DRGARE")
@@ -52,21 +52,12 @@ def read_cell(path: str | Path) -> Cell:
 
     Raises InputError if it is no S-57 cell or looks encrypted (S-63), UnavailableError without the extra `charts`.
     """
-    try:
-        import pyogrio
-    except ImportError:
-        raise UnavailableError("reading charts needs pyogrio: pip install 'quarterdeck[charts]'") from None
+    if find_spec("pyogrio") is None:
+        raise UnavailableError("reading charts needs pyogrio: pip install 'quarterdeck[charts]'")
     _check_leader(Path(path))
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter(
-                "ignore", RuntimeWarning
-            )  # empty attributes, which are unknown, are said to be odd numbers
-            names = [name for name, _ in pyogrio.list_layers(path)]
-            head = _columns(pyogrio, path, "DSID", ("DSPM_CSCL", "DSID_EDTN", "DSID_UPDN"))[1]
-            objects = {name: _objects(pyogrio, path, name) for name in names if name != "DSID" and name.isupper()}
-    except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, ShapelyError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read as an S-57 cell ({str(error).splitlines()[0][:120]})") from None
+    layers = read_layers(path)
+    head = layers["DSID"].fields
+    objects = {name: _objects(name, layer) for name, layer in layers.items() if name != "DSID" and name.isupper()}
     scale = float(head["DSPM_CSCL"][0])
     return Cell(Path(path).name, scale if scale > 0 else float("inf"), head["DSID_EDTN"][0], head["DSID_UPDN"][0], objects)
 
@@ -85,18 +76,10 @@ def _check_leader(path: Path) -> None:
     raise InputError(f"{path}: is no S-57 cell; give the .000 file of an ENC")
 
 
-def _columns(pyogrio: Any, path: str | Path, layer: str, wanted: tuple[str, ...]) -> tuple[Any, dict[str, Any]]:
-    options = {"SPLIT_MULTIPOINT": "YES", "ADD_SOUNDG_DEPTH": "YES"}
-    meta, _, geometries, fields = pyogrio.raw.read(path, layer=layer, **options)
-    found = dict(zip(meta["fields"], fields, strict=True))
-    return geometries, {name: found[name] for name in wanted if name in found}
-
-
-def _objects(pyogrio: Any, path: str | Path, layer: str) -> tuple[tuple[BaseGeometry, float], ...]:
-    wanted = {"SOUNDG": "DEPTH", "M_COVR": "CATCOV"}.get(layer, "DRVAL1" if layer in DEPTHS else "VALSOU")
-    geometries, columns = _columns(pyogrio, path, layer, (wanted,))
-    shapes = shapely.from_wkb(geometries, on_invalid="ignore") if geometries is not None else []  # None: damaged
-    values = np.asarray(columns.get(wanted, np.full(len(shapes), np.nan)), dtype=float)
+def _objects(name: str, layer: Layer) -> tuple[tuple[BaseGeometry, float], ...]:
+    wanted = {"SOUNDG": "DEPTH", "M_COVR": "CATCOV"}.get(name, "DRVAL1" if name in DEPTHS else "VALSOU")
+    shapes = shapely.from_wkb(layer.geometries, on_invalid="ignore")  # None: damaged
+    values = np.asarray(layer.fields.get(wanted, np.full(len(shapes), np.nan)), dtype=float)
     return tuple((g, float(v)) for g, v in zip(shapes, values, strict=True) if g is not None and not g.is_empty)
 
 

@@ -118,6 +118,17 @@ def test_what_is_no_cell_is_refused(tmp_path):
             read_cell(path)
 
 
+def test_a_cell_that_crashes_the_reader_is_refused(tmp_path, monkeypatch):
+    """There are damaged cells at which GDAL's reader ends by a signal: it ends alone."""
+    pytest.importorskip("pyogrio", reason="the extra charts is not installed")
+    crash = tmp_path / "python"
+    crash.write_text("#!/bin/sh\nkill -s SEGV $$\n")
+    crash.chmod(0o755)
+    monkeypatch.setattr("sys.executable", str(crash))
+    with pytest.raises(InputError, match="crashes the reader"):
+        read_cell(Path(__file__).resolve().parents[2] / "data" / "sample_chart.000")
+
+
 @pytest.mark.skipif(not S57.exists(), reason=f"{S57} is absent: real cells were not read")
 def test_a_real_cell_gives_a_site(tmp_path, capsys):
     """GDAL's sample cell gives a site that our own reader takes, and says what it left out."""
