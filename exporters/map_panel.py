@@ -11,7 +11,7 @@ from quarterdeck.exporters.map_site import Sign
 from quarterdeck.mission.mission import Mission, Route
 from quarterdeck.physics.report import Report
 
-_COLUMNS = (0.0, 0.075, 0.105, 0.58, 0.70, 0.88, 1.0)  # colour, number, name, length, survey, time, energy
+_COLUMNS = (0.0, 0.075, 0.105, 0.56, 0.67, 0.85, 1.0)  # colour, number, name, length, survey, time, energy
 _ROWS_FULL_SIZE = 26  # rows of the table that stand in the usual type; more are set smaller
 
 
@@ -55,12 +55,12 @@ def _planned(mission: Mission) -> list[tuple[str, ...]]:
 
 def _run(report: Report) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = [
-        (v.id, *_figures(v.length, f"{v.legs.p95:.2f}", v.time, v.energy)) for v in report.vehicles
+        (v.id, *_figures(v.length, _short(v.legs.p95), v.time, v.energy)) for v in report.vehicles
     ]
     whole = [sum(v.length for v in report.vehicles), sum(v.energy for v in report.vehicles)]
     worst = max((v.legs.p95 for v in report.vehicles), default=0.0)
     longest = max((v.time for v in report.vehicles), default=0.0)
-    rows.append(("all (off, time: worst)", *_figures(whole[0], f"{worst:.2f}", longest, whole[1])))
+    rows.append(("all (off, time: worst)", *_figures(whole[0], _short(worst), longest, whole[1])))
     return rows
 
 
@@ -73,7 +73,12 @@ def _percent(part: float, whole: float) -> str:
 
 
 def _figures(length: float, middle: str, duration: float, energy: float) -> tuple[str, str, str, str]:
-    return f"{length / 1000:.2f}", middle, clock(duration), f"{energy:.0f}"
+    return _short(length / 1000), middle, clock(duration), f"{energy:.0f}"
+
+
+def _short(value: float) -> str:
+    """Return a figure of at most two decimals, and of four digits: columns have room for no more."""
+    return next((text for n in (2, 1) if len(text := f"{value:.{n}f}") <= 5), f"{value:.0f}")
 
 
 def _row(panel: Axes, y: float, size: float, texts: tuple[str, ...], *, weight: str = "normal") -> None:

@@ -123,6 +123,8 @@ def print_figures(mission: Mission) -> None:
         )
     screen.print(table)
     known = {n: f for n, f in WORDS.items() if mission.figures.get(n) is not None}
+    if "paper" in mission.figures:  # of tours along lines, as its bound and the paper's are; the table has the routes'
+        known["makespan"] = ("makespan", "{:,.0f} s without turns and climbs", 1.0)
     screen.print(
         "; ".join(f"{label} {form.format(mission.figures[n] * factor)}" for n, (label, form, factor) in known.items())
     )

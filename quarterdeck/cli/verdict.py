@@ -10,12 +10,14 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from rich.console import Console
+    from rich.table import Table
 
     from quarterdeck.mission.mission import Mission
     from quarterdeck.physics.report import Report
     from quarterdeck.physics.task_report import TaskReport
 
 
+SHORT_NAME = 16  # characters: names of so few are never folded
 # The fast world, in plain words: of triage, and of what has a plan's paces.
 POINTS = "points that turn at once and give way to nobody"
 PACED = "points that keep the plan's paces and give way to nobody"
@@ -23,24 +25,10 @@ PACED = "points that keep the plan's paces and give way to nobody"
 
 def print_report(mission: Mission, report: Report, *, how: str = "simulated") -> None:
     """Print the verdict and its figures on standard error."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
     screen = console()
-    table = Table(title=f"{mission.name}: {how}", title_justify="left", box=SIMPLE_HEAD)
-    table.add_column("vehicle", overflow="fold")
-    for column in ("time", "energy", "off track", "to obstacle", "to vehicle"):
-        table.add_column(column.replace(" ", "\n"), justify="right", no_wrap=True)
-    for v in report.vehicles[:60]:
-        table.add_row(
-            v.id,
-            f"{minutes(v.time)} {_change(v.time, v.time_planned)}",
-            f"{v.energy:,.{0 if v.energy >= 10 else 2}f} Wh {_change(v.energy, v.energy_planned)}",
-            f"{v.legs.p95:.2f} m",
-            "hit" if v.hits else _metres(v.clearance),
-            _metres(v.separation),
-        )
-    screen.print(table)
+    roomy = screen.options.update(max_width=1000)
+    tables = [_vehicles(mission, report, how, between) for between in (" ", "\n")]
+    screen.print(next((t for t in tables if screen.measure(t, options=roomy).maximum <= screen.width), tables[-1]))
     if report.tasks:
         _print_tasks(screen, report.tasks)
     figures = report.figures
@@ -75,6 +63,28 @@ def print_report(mission: Mission, report: Report, *, how: str = "simulated") ->
         print_reason(screen, "failed", reason)
     if report.passed:
         screen.print("passed", style="bold")
+
+
+def _vehicles(mission: Mission, report: Report, how: str, between: str) -> Table:
+    """Return the table of the vehicles' figures, with `between` each and how far it is from the plan's."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    table = Table(title=f"{mission.name}: {how}", title_justify="left", box=SIMPLE_HEAD)
+    longest = max((len(v.id) for v in report.vehicles), default=0)
+    table.add_column("vehicle", overflow="fold", min_width=min(max(longest, len("vehicle")), SHORT_NAME))
+    for column in ("time", "energy", "off track", "to obstacle", "to vehicle"):
+        table.add_column(column.replace(" ", "\n"), justify="right", no_wrap=True)
+    for v in report.vehicles[:60]:
+        table.add_row(
+            v.id,
+            f"{minutes(v.time)}{between}{_change(v.time, v.time_planned)}",
+            f"{v.energy:,.{0 if v.energy >= 10 else 2}f} Wh{between}{_change(v.energy, v.energy_planned)}",
+            f"{v.legs.p95:.2f} m",
+            "hit" if v.hits else _metres(v.clearance),
+            _metres(v.separation),
+        )
+    return table
 
 
 def _print_beside(screen: Console, report: Report, fast: float) -> None:

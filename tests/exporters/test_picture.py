@@ -2,6 +2,7 @@
 
 import io
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.scenario import Area, Casualty, Obstacle
 from quarterdeck.mission.mission import Layer, undone_layer
 from quarterdeck.physics.moments import Moment
+from quarterdeck.physics.report import CrossTrack, Report, VehicleReport
 
 
 def pixels(png):
@@ -99,6 +101,26 @@ def test_a_legend_of_long_names_is_not_cut(make_fleet):
     lines = [text for text in panel.texts if "lines more" in text.get_text()]
     assert len(lines) == 1
     assert lines[0].get_window_extent().y0 >= box_of.y1
+
+
+def test_long_figures_stand_apart(make_fleet):
+    """Of a row of the table no figure reaches into the one before, however far off its legs a vehicle was."""
+    off = CrossTrack(1.0, 2985.43, 3000.0, 9)
+    vehicles = tuple(
+        VehicleReport(name, "surface", True, False, off, off, 0, (), 0.0, None, 0.0, "", None, 0.0, "", 1e5, time=136_168.0,
+                      energy_planned=1e5, energy=98_000.0, length_planned=1e5, length=115_116.0)
+        for name in ("usv1", "usv2")
+    )  # fmt: skip
+    report = Report("m", "0", {}, {}, {}, vehicles, (), "")
+    panel = drawn_by(picture, make_fleet(2), report=report).axes[1]
+    rows = {}
+    for text in panel.texts:
+        rows.setdefault(round(text.get_position()[1], 6), []).append(text)
+    worst = [text.get_text() for text in panel.texts if text.get_weight() == "bold"]
+    assert {"230", "2985"} <= {text.split(".")[0] for text in worst}
+    ends = [[(t.get_window_extent(), t.get_text()) for t in row] for row in rows.values()]
+    crowded = [(a, b) for row in ends for (one, a), (other, b) in pairwise(row) if one.x1 >= other.x0]
+    assert not crowded
 
 
 def test_areas_of_a_priority_have_their_names_on_the_map(make_fleet):
