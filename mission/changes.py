@@ -155,7 +155,7 @@ def _edited(edit: _Edit, mission: Mission) -> Changes:
     names = EDITS[edit.role][edit.change]
     known = {
         "vehicle": [v.id for v in (mission.lost if edit.change == "back" else mission.vehicles)],
-        "obstacle": [o.id for o in mission.site.obstacles],
+        "obstacle": [*(o.id for o in mission.site.obstacles), *(wreck_name(v.id) for v in mission.vehicles)],
         "area": [a.id for a in mission.site.areas],
         "task": [t.id for t in mission.tasks],
     }[edit.role]
@@ -219,6 +219,11 @@ def _set(edit: _Edit, names: tuple[str, ...], mission: Mission) -> Changes:
     return Changes(edited=(replace(task, **given),))
 
 
+def wreck_name(lost: str) -> str:
+    """Return what a vehicle that is lost is called as an obstacle."""
+    return f"wreck of {lost}"
+
+
 def _known(what: str, name: str, known: Collection[str], place: str = "") -> None:
     """Raise InputError with the nearest id if there is no such thing."""
     if name in known:
@@ -235,7 +240,7 @@ def check_changes(mission: Mission, changes: Changes) -> None:
     areas, tasks = [a.id for a in site.areas], [t.id for t in mission.tasks]
     for what, named, known in (
         ("vehicle", {*changes.lost, *_set_anew(changes)}, [*ids, *changes.back]),
-        ("obstacle", changes.gone, [o.id for o in site.obstacles]),
+        ("obstacle", changes.gone, [*(o.id for o in site.obstacles), *map(wreck_name, sorted(changes.lost))]),
         ("area or task", changes.withdrawn, [*areas, *tasks]),
         ("area", changes.priorities, areas),
     ):

@@ -18,14 +18,16 @@ from quarterdeck.mission.timing import shortfalls
 
 HIGHEST = 10_000.0  # m above ground: no height that somebody means
 TOLERANCE = 0.05  # m: positions in a PLAN are rounded, curves are polygons
+Way = tuple[np.ndarray, np.ndarray]  # (n,) seconds and (n, 3) metres
 
 
-def check_mission(mission: Mission) -> tuple[str, ...]:
+def check_mission(mission: Mission, *, prove: bool = True) -> tuple[str, ...]:
     """Return every problem found, a line each: none means that the plan can be driven as it is.
 
     Checked are: numbers and order of times; staying in the operating area; clear of obstacles by each vehicle's clearance
     (its berth apart); survey legs in the areas; vehicles apart in time; energy and endurance with the reserve; ceilings and
-    rates of climb; jumps; a guards plan's coverage, by another way than it was planned; and what the planner itself found.
+    rates of climb; jumps; what the planner itself found; and, to `prove` it, a guards plan's coverage, by another way than
+    it was planned.
     """
     broken = unsound(mission)
     if broken:
@@ -41,7 +43,7 @@ def check_mission(mission: Mission) -> tuple[str, ...]:
     for route in mission.routes:
         problems += map(str, shortfalls(mission.vehicle(route.vehicle), route))
     problems += [*too_high(mission), *too_steep(mission)]
-    if mission.method == "guards":
+    if mission.method == "guards" and prove:
         from quarterdeck.mission.guard_check import unproved  # numba and more, which exports need not wait for
 
         problems += unproved(mission)
@@ -182,22 +184,25 @@ def _astray(mission: Mission) -> list[str]:
 def _meetings(mission: Mission) -> list[str]:
     """Pairs of vehicles that would touch, both under way, by the plan's times."""
     problems = []
-    ways = {route.vehicle: _way(route) for route in mission.routes}
-    boxes = {name: (p.min(axis=0), p.max(axis=0)) for name, (_, p) in ways.items()}
-    for a, b in combinations(mission.routes, 2):
-        one, two = mission.vehicle(a.vehicle), mission.vehicle(b.vehicle)
-        room = (one.model.length + two.model.length) / 2
-        (low_a, high_a), (low_b, high_b) = boxes[one.id], boxes[two.id]
-        if (low_a > high_b + room).any() or (low_b > high_a + room).any():
-            continue
-        gap, when = _closest(ways[one.id], ways[two.id], _away(one), _away(two))
-        if gap < room:
+    ways = [(mission.vehicle(route.vehicle), way_of(route)) for route in mission.routes]
+    for (one, a), (two, b) in combinations(ways, 2):
+        if found := met(one, a, two, b):
+            gap, when, room = found
             problems.append(f"{one.id} and {two.id}: {gap:.1f} m apart at {when:.0f} s; they need {room:.1f} m")
     return problems
 
 
-def _way(route: Route) -> tuple[np.ndarray, np.ndarray]:
-    """(2n,) times and (2n, 3) places: when it arrives at each waypoint and when it leaves."""
+def met(one: Vehicle, a: Way, two: Vehicle, b: Way) -> tuple[float, float, float] | None:
+    """Return metres, seconds and the metres needed where two vehicles come too near on their ways; None: they do not."""
+    room = (one.model.length + two.model.length) / 2
+    if (a[1].min(axis=0) > b[1].max(axis=0) + room).any() or (b[1].min(axis=0) > a[1].max(axis=0) + room).any():
+        return None
+    gap, when = closest(a, b, _away(one), _away(two))
+    return (gap, when, room) if gap < room else None
+
+
+def way_of(route: Route) -> Way:
+    """Return (2n,) times and (2n, 3) places: when it arrives at each waypoint and when it leaves."""
     arrive = np.array([w.time for w in route.waypoints])
     leave = arrive + np.array([w.hold for w in route.waypoints])
     return np.column_stack([arrive, leave]).ravel(), np.repeat(route.xyz, 2, axis=0)
@@ -214,13 +219,18 @@ def _away(vehicle: Vehicle) -> Callable[[np.ndarray], np.ndarray]:
     return away
 
 
-def _closest(
-    a: tuple[np.ndarray, np.ndarray],
-    b: tuple[np.ndarray, np.ndarray],
+def always(places: np.ndarray) -> np.ndarray:
+    """Whether (n, 3) places count: all do."""
+    return np.ones(len(places), dtype=bool)
+
+
+def closest(
+    a: Way,
+    b: Way,
     away_a: Callable[[np.ndarray], np.ndarray],
     away_b: Callable[[np.ndarray], np.ndarray],
 ) -> tuple[float, float]:
-    """The least distance and its time, away from berths.
+    """Return the least distance and its time, away from berths.
 
     Between two common breakpoints the relative motion is straight, so each pair of legs is closest at one place, exactly;
     where that place is at a berth, the rest of the pair is not looked at.

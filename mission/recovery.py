@@ -169,10 +169,12 @@ def _replanned(
     if not working:
         return now
     progress = _progress(now, time, states)
-    lie = {**states, **{v: replace(states[v], x=x, y=y) for v, (x, y) in now.sighted.items()}}
+    lie = {v: (s.x, s.y) for v, s in states.items()} | dict(now.sighted)
+    berths = [v.home for v in first.vehicles]
     afloat = (working | set(moved)) & now.wrecks.keys()
     unmarked = sorted(now.given_up - (now.wrecks.keys() - afloat))
-    new = {v: w for v in unmarked if (w := wreck_of(first, v, working, lie)) is not None}
+    others = [lie[v] for v in sorted(working)]
+    new = {v: w for v in unmarked if (w := wreck_of(first.vehicle(v), lie[v], berths, others)) is not None}
     changes = Changes(
         lost=frozenset(planned & now.given_up),
         back=dict.fromkeys(sorted(working - planned)),

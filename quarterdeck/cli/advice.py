@@ -1,4 +1,4 @@
-"""What a site lacks for planning, and what in it may not be meant: told by `check`, and by the verbs that plan."""
+"""What a site or a plan lacks, and what may not be meant: told by `check`, and by the verbs that plan."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ if TYPE_CHECKING:
 
     from quarterdeck.geo.geojson import Document
     from quarterdeck.geo.scenario import Scenario
+    from quarterdeck.mission.mission import Mission
 
+NAMED = 3  # problems, at the most
 NEAR = 100.0  # m: so near to the work no vehicle is far from it
 
 
@@ -92,6 +94,21 @@ def far_off(scenario: Scenario, document: Document) -> Iterator[str]:
 
 def _far(metres: float) -> str:
     return f"{metres / 1000:,.1f} km" if metres >= 1000 else f"{metres:.0f} m"
+
+
+def refused(mission: Mission) -> Iterator[str]:
+    """Yield what `check` will say of a plan that was made, beside why it is infeasible, and what helps."""
+    from quarterdeck.mission.check import check_mission
+    from quarterdeck.mission.waits import waits
+
+    told = {str(reason) for reason in mission.reasons}
+    problems = [problem for problem in check_mission(mission, prove=False) if problem not in told]
+    yield from problems[:NAMED]
+    if len(problems) > NAMED:
+        yield f"and {len(problems) - NAMED} more, which `check` lists"
+    if problems:
+        later = " and ".join(f"{vehicle} sets out {wait:.0f} s later" for vehicle, wait in waits(mission).items())
+        yield "`export` refuses that" + (f", but with --unsafe; nobody meets anybody if {later}" if later else "")
 
 
 def print_notes(lines: Iterator[str]) -> None:

@@ -79,7 +79,7 @@ def command(
     Ctrl-C ends the searches and writes what there is; a second one ends at once, with nothing.
     """
     from quarterdeck.api import default_method, plan, plan_text, read_scenario
-    from quarterdeck.cli.advice import far_off, print_notes
+    from quarterdeck.cli.advice import far_off, print_notes, refused
     from quarterdeck.geo.deadline import limited
     from quarterdeck.geo.geojson import opened
     from quarterdeck.mission.planfile import plan_outcome
@@ -108,6 +108,7 @@ def command(
         click.echo(json.dumps(plan_outcome(mission)), err=True)
     else:
         print_figures(mission)
+        print_notes(refused(mission))
     if limit.interrupted:
         return 130
     return 0 if mission.feasible else 1

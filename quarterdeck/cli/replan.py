@@ -66,10 +66,13 @@ def command(
     Ctrl-C ends the searches and writes what there is; a second one ends at once, with nothing.
     """
     from quarterdeck.api import within
+    from quarterdeck.cli.advice import print_notes, refused
     from quarterdeck.geo.deadline import limited
     from quarterdeck.mission.changes import Changes, check_changes, read_changes
     from quarterdeck.mission.planfile import plan_text, read_plan
     from quarterdeck.mission.replan import replan
+    from quarterdeck.mission.waits import parted
+    from quarterdeck.mission.wrecks import with_wrecks
 
     tell_compiling()
     mission = read_plan(plan)
@@ -82,10 +85,19 @@ def command(
     for vehicle in sorted(so_far.lost & {v.id for v in mission.vehicles} - changes.lost - changes.back.keys()):
         print_reason(console(), "note", f"{vehicle} was lost, by the report: others do what is left of its part")
         changes |= Changes(lost=frozenset({vehicle}))
+    changes = with_wrecks(mission, so_far, changes)
+    _tell_wrecks(mission, changes)
     with limited(interruptible=tell_stopping) as limit:
         after = within(time_limit, lambda: replan(mission, so_far, changes, seed=seed))
+    if changes and after.spacing is not None:
+        after = parted(after)
+        if any(v.share is not None for v in mission.vehicles):
+            print_reason(
+                console(), "note", "what is left is shared out by time, all to be done at once, not by the shares given"
+            )
     emit(plan_text(after), output, force=force)
     print_figures(after)
+    print_notes(refused(after))
     if limit.interrupted:
         return 130
     return 0 if after.feasible else 1
@@ -105,6 +117,25 @@ def _removed(lost: str, gone: str, withdrawn: str) -> Changes:
         except ValueError:
             raise InputError(f"--lost {item}: {moment!r} is no number of seconds; write ID or ID@SECONDS") from None
     return Changes(lost=frozenset(ids), since=since, gone=frozenset(_ids(gone)), withdrawn=frozenset(_ids(withdrawn)))
+
+
+def _tell_wrecks(mission: Mission, changes: Changes) -> None:
+    """Print where who is lost is taken to lie."""
+    import numpy as np
+
+    from quarterdeck.mission.changes import wreck_name
+
+    wrecks = {wreck_name(v): v for v in changes.lost}
+    for obstacle in changes.obstacles:
+        if vehicle := wrecks.get(obstacle.id):
+            middle = obstacle.polygon.centroid
+            lon, lat = mission.frame.to_degrees(np.array([[middle.x, middle.y]]))[0]
+            print_reason(
+                console(),
+                "note",
+                f"{vehicle} is taken to lie at {lon:.6f}, {lat:.6f}, in the others' way; when it has been taken away: "
+                f'replan with --gone "{obstacle.id}"',
+            )
 
 
 def _progress(
