@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from shapely import LineString, MultiLineString, MultiPolygon
 
-from quarterdeck.coverage.metrics import swath, track_length
+from quarterdeck.coverage.metrics import covered_fraction, swath, track_length
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Area, Scenario, Site, Vehicle, as_multipolygon
 from quarterdeck.mission.changes import Changes
@@ -18,9 +18,11 @@ from quarterdeck.mission.mission import Layer, Mission, unbroken, undone_layer
 from quarterdeck.mission.progress import Progress, with_surveyed
 from quarterdeck.mission.reason import Reason
 from quarterdeck.mission.remaining import clipped, remaining_parts
-from quarterdeck.mission.routes import survey_tracks
+from quarterdeck.mission.routes import survey_lines, survey_tracks
 from quarterdeck.mission.sharing import Line
 from quarterdeck.mission.survey_shares import VISITED, Access, shared, survey_paces
+
+TOO_NEAR = "too near to what is new"
 
 
 def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, changes: Changes, *, seed: int) -> Mission:
@@ -41,7 +43,8 @@ def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, ch
     survey = shared(scenario, roads, own, released, paces, spacing)
     left = [line.points for line in survey.left]
     ahead = [t for v, r in zip(scenario.vehicles, survey.routes, strict=True) for t in survey_tracks(v, r)]
-    driven = _swath([*(np.array(line.coords) for line in done), *ahead], spacing)
+    earlier = [np.array(line.coords) for line in done]
+    driven = _swath([*earlier, *ahead], spacing)
     site = scenario.site.coverable
     missed = as_multipolygon(shapely.difference(site, driven, grid_size=1e-6 * spacing))
     gaps = as_multipolygon(shapely.intersection(_swath(left, spacing), missed, grid_size=1e-6 * spacing))
@@ -54,7 +57,9 @@ def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, ch
         vehicles=scenario.vehicles,
         routes=survey.routes,
         figures={
-            "poc": 1.0 - missed.area / site.area if site.area else 1.0,
+            "poc": covered_fraction(
+                [*earlier, *survey_lines(survey.routes)], site, spacing
+            ),  # as a plan's: corners not cut
             "length": sum(track_length(t) for t in ahead),
             "makespan": max(r.duration for r in survey.routes),
             "energy": sum(r.energy for r in survey.routes),
@@ -67,6 +72,22 @@ def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, ch
         layers=_undone_layers(gaps, rim),
         surveyed=done,
         left_out=tuple(LineString(line) for line in left),
+    )
+
+
+def without_corners(mission: Mission) -> Mission:
+    """Return a survey from now on whose area too near to what is new has no corners: only turns cut lines short there."""
+    lines = [*(np.array(line.coords) for line in mission.surveyed), *survey_lines(mission.routes)]
+    along = _swath(lines, float(mission.spacing or 0.0))
+    layers, less = [], 0.0
+    for layer in mission.layers:
+        areas = [(g, told["why"]) for g, told in zip(layer.geometries, layer.properties, strict=True)]
+        kept = [(as_multipolygon(g.difference(along)) if why == TOO_NEAR else g, why) for g, why in areas]
+        less += sum(g.area for g, _ in areas) - sum(g.area for g, _ in kept)
+        kept = [(g, why) for g, why in kept if g.area > 0]
+        layers += [undone_layer(kept)] if kept else []
+    return replace(
+        mission, layers=tuple(layers), figures={**mission.figures, "undone_m2": mission.figures["undone_m2"] - less}
     )
 
 
@@ -86,7 +107,7 @@ def _why(left: Sequence[Line]) -> str:
 
 def _undone_layers(gaps: MultiPolygon, rim: MultiPolygon) -> tuple[Layer, ...]:
     """Return the areas that are not done, with why."""
-    areas = [(g, why) for g, why in ((gaps, "left out"), (rim, "too near to what is new")) if g.area > 0]
+    areas = [(g, why) for g, why in ((gaps, "left out"), (rim, TOO_NEAR)) if g.area > 0]
     return (undone_layer(areas),) if areas else ()
 
 

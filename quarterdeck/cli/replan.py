@@ -71,6 +71,7 @@ def command(
     from quarterdeck.mission.changes import Changes, check_changes, read_changes
     from quarterdeck.mission.planfile import plan_text, read_plan
     from quarterdeck.mission.replan import replan
+    from quarterdeck.mission.survey_recovery import without_corners
     from quarterdeck.mission.waits import parted
     from quarterdeck.mission.wrecks import with_wrecks
 
@@ -90,7 +91,7 @@ def command(
     with limited(interruptible=tell_stopping) as limit:
         after = within(time_limit, lambda: replan(mission, so_far, changes, seed=seed))
     if changes and after.spacing is not None:
-        after = parted(after)
+        after = parted(without_corners(after))
         if any(v.share is not None for v in mission.vehicles):
             print_reason(
                 console(), "note", "what is left is shared out by time, all to be done at once, not by the shares given"

@@ -13,6 +13,8 @@ from quarterdeck.mission.changes import Changes
 from quarterdeck.mission.cover import cover
 from quarterdeck.mission.planfile import plan_text, read_plan
 from quarterdeck.mission.progress import planned_progress
+from quarterdeck.mission.replan import replan
+from quarterdeck.mission.survey_recovery import without_corners
 from quarterdeck.mission.wrecks import with_wrecks
 
 DATA = Path(__file__).parents[2] / "data"
@@ -70,3 +72,16 @@ def test_what_fell_from_the_air_is_in_nobodys_way():
     plan = cover(read_scenario(DATA / "farm_survey.geojson"))
     lost = Changes(lost=frozenset({plan.vehicles[0].id}))
     assert with_wrecks(plan, planned_progress(plan, 300.0), lost) == lost
+
+
+def test_a_loss_costs_no_coverage_but_what_is_too_near():
+    """Coverage is reckoned along the lines, as a plan's: a wreck takes no more than is told as left, and no corners."""
+    plan = cover(read_scenario(DATA / "west_ant_island.geojson"))
+    time, lost = 8000.0, frozenset({"usv-2"})
+    progress = planned_progress(plan, time)
+    after = replan(plan, progress, Changes(lost=lost))
+    assert after.figures["poc"] == pytest.approx(plan.figures["poc"], abs=5e-4)
+    around = without_corners(replan(plan, progress, with_wrecks(plan, progress, Changes(lost=lost))))
+    fewer = (after.figures["poc"] - around.figures["poc"]) * plan.site.coverable.area
+    assert around.figures["undone_m2"] == pytest.approx(max(fewer, 0.0), abs=500.0)
+    assert sum(area.area for area in around.layer("undone").geometries) == pytest.approx(around.figures["undone_m2"])
