@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from quarterdeck.geo.frame import Frame
 
 NAME_SIZE = 6.5  # points
+SPECK = 30  # pixels: an area of fewer is not seen
 
 
 def clock(seconds: float) -> str:
@@ -29,6 +30,14 @@ def fill(chart: Axes, geometry: BaseGeometry, **style: Any) -> None:
             continue
         rings = [np.asarray(ring.coords)[:, :2] for ring in (polygon.exterior, *polygon.interiors)]
         chart.add_patch(PathPatch(Path.make_compound_path(*[Path(ring, closed=True) for ring in rings]), **style))
+
+
+def in_sight(chart: Axes, geometry: BaseGeometry) -> bool:
+    """Return whether any polygon of a geometry in metres, within the chart's limits, is more than a speck on it."""
+    (west, east), (south, north) = chart.get_xlim(), chart.get_ylim()
+    pixel = (east - west) / chart.get_window_extent().width
+    inside = shapely.clip_by_rect(geometry, west, south, east, north)
+    return any(part.area >= SPECK * pixel**2 for part in getattr(inside, "geoms", [inside]))
 
 
 def graticule(chart: Axes, frame: Frame) -> None:

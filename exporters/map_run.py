@@ -10,7 +10,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from quarterdeck.exporters.map_furniture import clock, fill
+from quarterdeck.exporters.map_furniture import clock, fill, in_sight
 from quarterdeck.exporters.map_site import HALO, Sign
 from quarterdeck.geo.scenario import Site
 from quarterdeck.mission.mission import Mission
@@ -69,15 +69,23 @@ def lost(chart: Axes, mission: Mission, moments: Sequence[Moment], palette: Mapp
     for vehicle, place, words in gone:
         chart.plot(*place, **LOST, color=palette[vehicle], zorder=9)
         _name(chart, place, words, weight="bold")
-    signs: list[Sign] = [Line2D([], [], **LOST, color="white", label="lost: where and when")] if gone else []
+    label = "lost: where and when" if marked else "lost: where"
+    signs: list[Sign] = [Line2D([], [], **LOST, color="white", label=label)] if gone else []
     return signs + ([Line2D([], [], **TOLD, color="white", label="told a new route, when")] if told else [])
 
 
 def _name(chart: Axes, place: tuple[float, float], words: str, *, weight: str) -> None:
-    right = chart.transAxes.inverted().transform(chart.transData.transform(place))[0] > 0.8  # a name stays on the map
+    """Write words beside a place: on the first of its sides where they stay on the map and cover no other words."""
     look: dict[str, Any] = {"fontsize": 7, "weight": weight, "bbox": HALO, "annotation_clip": True, "parse_math": False}
-    look |= {"xytext": (-6 if right else 6, -9), "textcoords": "offset points", "ha": "right" if right else "left"}
-    chart.annotate(words, place, **look, zorder=9.5)
+    there, frame = [text.get_window_extent() for text in chart.texts], chart.get_window_extent()
+    tried = []
+    for dx, dy in ((6, -9), (-6, -9), (6, 9), (-6, 9), (6, -20), (-6, -20)):
+        side = "left" if dx > 0 else "right"
+        text = chart.annotate(words, place, xytext=(dx, dy), textcoords="offset points", ha=side, zorder=9.5, **look)
+        box = text.get_window_extent()
+        tried.append((not (frame.x0 <= box.x0 and box.x1 <= frame.x1), sum(map(box.overlaps, there)), len(tried), text))
+    for *_, text in sorted(tried, key=lambda t: t[:3])[1:]:
+        text.remove()
 
 
 def found(chart: Axes, site: Site, followed: Mission) -> list[Sign]:
@@ -87,4 +95,5 @@ def found(chart: Axes, site: Site, followed: Mission) -> list[Sign]:
     look: dict[str, Any] = {"facecolor": "none", "edgecolor": "#7a0177", "hatch": "xxxx", "linewidth": 0.8}
     for obstacle in new:
         fill(chart, obstacle.polygon, **look, zorder=3.5)
-    return [Patch(**look, label="wreck or find")] if new else []
+    seen = any(in_sight(chart, obstacle.polygon) for obstacle in new)
+    return [Patch(**look, label="wreck or find")] if seen else []

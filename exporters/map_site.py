@@ -4,6 +4,7 @@ Each function draws one kind of thing and returns the legend's signs of what it 
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from matplotlib.patches import Patch
 from scipy.sparse.csgraph import connected_components
 
 from quarterdeck.exporters.casualties import MEANING
-from quarterdeck.exporters.map_furniture import fill
+from quarterdeck.exporters.map_furniture import fill, in_sight
 from quarterdeck.geo.palette import CASUALTY, SITE
 from quarterdeck.geo.scenario import Obstacle
 from quarterdeck.mission.layers import drawn
@@ -66,15 +67,26 @@ def site(chart: Axes, mission: Mission, strange: Sequence[Obstacle] = ()) -> lis
 
 
 def layers(chart: Axes, mission: Mission, palette: Mapping[str, str], *, run: bool) -> list[Sign]:
-    """Draw what the planner drew: regions, guards, what was surveyed before, what is left out; of a plan its graphs too."""
-    return [
-        _layer(chart, layer, palette)
-        for layer in drawn(mission)
-        if layer.name not in LINES and not (run and layer.name in WORKINGS)
-    ]
+    """Draw what the planner drew: regions, guards, what was surveyed before, what is left out; of a plan its graphs too.
+
+    Left out are regions where another plan was told in a run, for they are of the first, and of a run guards to which
+    nobody goes.
+    """
+    without = (*LINES, *(WORKINGS if run else ()), *(("region",) if mission.parameters.get("told_at") else ()))
+    shown = [layer for layer in drawn(mission) if layer.name not in without]
+    signs = [_layer(chart, _visited(layer) if run and layer.name == "guards" else layer, palette) for layer in shown]
+    return [sign for sign in signs if sign is not None]
 
 
-def _layer(chart: Axes, layer: Layer, palette: Mapping[str, str]) -> Sign:
+def _visited(layer: Layer) -> Layer:
+    kept = [i for i, p in enumerate(layer.properties) if p["vehicle"] is not None or p["seen"]]
+    return replace(
+        layer, geometries=tuple(layer.geometries[i] for i in kept), properties=tuple(layer.properties[i] for i in kept)
+    )
+
+
+def _layer(chart: Axes, layer: Layer, palette: Mapping[str, str]) -> Sign | None:
+    """Draw a layer and return its sign, None where nothing of it can be seen."""
     own = next((p["stroke"] for p in layer.properties if "stroke" in p), None)
     theirs = own is None and any(p.get("vehicle") in palette for p in layer.properties)
     name, sign = layer.name + (", by vehicle" if theirs else ""), own or "#777777"
@@ -93,6 +105,8 @@ def _layer(chart: Axes, layer: Layer, palette: Mapping[str, str]) -> Sign:
             shapes.add("line")
             lines = [shapely.get_coordinates(g) for g in getattr(geometry, "geoms", [geometry])]
             chart.add_collection(LineCollection(lines, colors=colour, linewidths=0.7, zorder=4))
+    if not shapes or (shapes == {"area"} and not any(in_sight(chart, g) for g in layer.geometries)):
+        return None
     if shapes == {"area"}:
         return Patch(facecolor=sign, alpha=0.25, label=name)
     if shapes == {"point"}:

@@ -12,9 +12,10 @@ from shapely import LineString, Point, box
 from quarterdeck.exporters.picture import picture
 from quarterdeck.geo.frame import Frame
 from quarterdeck.geo.scenario import Area, Casualty, Obstacle
-from quarterdeck.mission.mission import Layer, undone_layer
+from quarterdeck.mission.mission import Guard, Layer, undone_layer
 from quarterdeck.physics.moments import Moment
 from quarterdeck.physics.report import CrossTrack, Report, VehicleReport
+from quarterdeck.physics.trace import COLUMNS, Trace
 
 
 def pixels(png):
@@ -64,7 +65,7 @@ def drawn_by(png_of, *args, **options):
 
 def test_the_legend_has_what_is_drawn_and_nothing_else(make_fleet):
     """Layers, regions, casualties and kinds of obstacles that are there are told; what is not there is not."""
-    line, area = LineString([(0, 0), (1, 1)]), box(0, 0, 1, 1)
+    line, area = LineString([(0, 0), (1, 1)]), box(0, 0, 9, 9)
     layers = (
         Layer("surveyed", (line,), ({"stroke": "#999999"},)),
         undone_layer([(area, "no energy left")]),
@@ -87,6 +88,38 @@ def test_what_a_plan_and_its_run_leave_undone_has_one_sign(make_fleet):
     mission = replace(mission, layers=(undone_layer([(box(0, 0, 5, 5), "w")]),))
     legend = drawn_by(picture, mission, followed=mission).axes[1].get_legend()
     assert [text.get_text() for text in legend.get_texts()].count("undone") == 1
+
+
+def test_a_run_is_not_drawn_over_the_plan_that_it_replaced(make_fleet):
+    """Of a plan as told its first regions are not shown, nor of its run guards that nobody goes to."""
+    mission, area = make_fleet(1), box(0, 0, 9, 9)
+    mission = replace(mission, layers=(Layer("region", (area,), ({"vehicle": "usv1"},)),))
+    guards = (Guard(5.0, 5.0, 9.0, "usv1", 0), Guard(30.0, 30.0, 9.0, None, None))
+    assert "region, by vehicle" in told(picture, mission)[0]
+    recovered = replace(mission, parameters={**mission.parameters, "told_at": [30.0]}, guards=guards)
+    stands = {name: np.zeros((1, 1), kind) for name, kind in COLUMNS.items()}
+    chart, panel = drawn_by(picture, recovered, Trace(vehicles=("usv1",), time=np.zeros(1), **stands)).axes
+    assert "region, by vehicle" not in {text.get_text() for text in panel.get_legend().get_texts()}
+    dots = {tuple(line.get_xydata()[0]) for line in chart.lines if line.get_zorder() == 6.5}
+    assert dots == {(5.0, 5.0)}
+
+
+def test_a_loss_hides_no_number_of_a_start(make_fleet):
+    """Words beside a loss stand on a side where they cover no others."""
+    plan = make_fleet(2)
+    x, y = plan.vehicles[0].start
+    chart = drawn_by(picture, plan, moments=(Moment(60.0, "usv1", "lost", x - 1.0, y + 6.0),)).axes[0]
+    words, number = (next(t for t in chart.texts if t.get_text() == name) for name in ("usv1 lost 1:00", "1"))
+    assert not words.get_window_extent().overlaps(number.get_window_extent())
+
+
+def test_a_legend_has_no_sign_of_specks(make_fleet):
+    """Of what is too small to see, or out of sight, there is none."""
+    plan = make_fleet(1)
+    small = Obstacle("wreck of usv9", Point(50.0, 50.0).buffer(0.01))
+    far = replace(plan, site=replace(plan.site, obstacles=(*plan.site.obstacles, small)))
+    far = replace(far, layers=(undone_layer([(box(1e5, 1e5, 1.1e5, 1.1e5), "w")]),))
+    assert not {"wreck or find", "undone"} & told(picture, plan, followed=far)[0]
 
 
 def test_a_legend_of_long_names_is_not_cut(make_fleet):
@@ -141,8 +174,9 @@ def test_who_is_lost_and_who_takes_over_is_marked(make_fleet):
     signs, written = told(picture, plan, moments=moments, followed=followed)
     assert {"lost: where and when", "told a new route, when", "wreck or find"} <= signs
     assert {"usv2 lost 5:00", "1:05:30", "usv2 lost", "usv1 told a new route"} <= set(written)
-    given_up = replace(plan, lost=(replace(plan.vehicles[0], id="usv9"),))
-    assert "usv9 lost" in told(picture, given_up)[1]
+    signs, written = told(picture, replace(plan, lost=(replace(plan.vehicles[0], id="usv9"),)))
+    assert "usv9 lost" in written
+    assert "lost: where" in signs
 
 
 def test_fifty_vehicles_fit(make_fleet):
