@@ -5,15 +5,17 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import shapely
 from shapely.geometry.base import BaseGeometry
 
 from quarterdeck.coverage.metrics import uncovered
 from quarterdeck.geo.angles import wrap
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Vehicle
-from quarterdeck.mission.matching import Followed, follow, off_legs
+from quarterdeck.mission.matching import Followed, follow, off_legs, tolerance
 from quarterdeck.mission.mission import Mission, Route
 from quarterdeck.mission.recorded import progress_state, recorded_progress
+from quarterdeck.mission.routes import survey_lines
 from quarterdeck.mission.served import served_tasks
 from quarterdeck.mission.track import NEAR, Track, energy_used, pace
 from quarterdeck.mission.tracks import Record
@@ -31,6 +33,7 @@ from quarterdeck.physics.triage import expected, side_by_side, told_by_tracks
 
 FINEST, COARSEST = 0.1, 1.0  # s between samples
 MOST = 1_000_000  # samples: of longer missions they are farther apart
+OTHERS = 0.05  # of its time along others' lines: more is no detour
 STILL = 0.05  # m/s: slower, it stands
 HULL = 1.0  # m over which a course is taken for the heading, where the log has none
 
@@ -56,6 +59,12 @@ def report_tracks(
     arrived = {t.vehicle for t in record.tracks if np.isfinite(t.arrived)} - gone.keys()
     short = [t for t in record.tracks if t.vehicle not in arrived | gone.keys()]
     notes += [f"{t.vehicle}: its log ends at {t.time[-1]:,.0f} s, before it was home" for t in short]
+    swapped = [t.vehicle for t, on in zip(record.tracks, followed, strict=True) if _on_others(mission, t, on)]
+    if swapped:
+        notes.append(
+            f"{', '.join(swapped)}: surveyed lines that the plan gives to others; a run that replanned is measured by the "
+            "plan as it was told (simulate --told)"
+        )
     report = measure(
         mission,
         trace,
@@ -71,6 +80,17 @@ def report_tracks(
         notes=(*record.notes, *notes),
     )
     return Run(trace, report)
+
+
+def _on_others(mission: Mission, track: Track, on: Followed) -> bool:
+    """Return whether a vehicle spent more than OTHERS of its time along survey lines that are not of its route."""
+    apart = np.flatnonzero(on.elsewhere)
+    if len(apart) <= OTHERS * len(on.elsewhere):
+        return False
+    route = next(r for r in mission.routes if r.vehicle == track.vehicle)
+    own = shapely.MultiLineString(survey_lines([route]))
+    near = tolerance(mission, mission.vehicle(track.vehicle))
+    return bool((~shapely.dwithin(shapely.points(track.xy[apart]), own, near)).sum() > OTHERS * len(on.elsewhere))
 
 
 def _triage_tracks(
@@ -154,6 +174,7 @@ def observed_trace(mission: Mission, tracks: Sequence[Track], followed: Sequence
     table["kind"][:] = UNKNOWN
     zones = vehicle_limits(vehicles)["zone"]
     by_vehicle = {t.vehicle: (t, f) for t, f in zip(tracks, followed, strict=True)}
+    gone = mission.parameters.get("lost_at", {})
     routes = {r.vehicle: r for r in mission.routes}
     notes = []
     for i, vehicle in enumerate(vehicles):
@@ -168,6 +189,9 @@ def observed_trace(mission: Mission, tracks: Sequence[Track], followed: Sequence
             )
         for name, values in _columns(vehicle, routes[vehicle.id], track, on, time, float(zones[i])).items():
             table[name][:, i] = values
+        if vehicle.id in gone and vehicle.domain != "aerial":  # where it was lost is no berth: others pass its wreck
+            off = np.hypot(*(np.column_stack([table["x"][:, i], table["y"][:, i]]) - vehicle.start).T)
+            table["underway"][:, i] = (table["kind"][:, i] != UNKNOWN) & (off > NEAR * vehicle.model.length)
     return Trace(vehicles=tuple(v.id for v in vehicles), time=time, **table), notes
 
 

@@ -132,11 +132,16 @@ def test_who_was_lost_is_named(tmp_path, capsys):
     plan, trace, told, rest, track = (tmp_path / n for n in ("plan", "run.npz", "told", "rest", "rest.npz"))
     assert run("plan", DATA / "plant_yard.geojson", "--spacing", 8, "-o", plan) == 0
     assert "share" in capsys.readouterr().err
-    run("simulate", plan, "--recover", "--fail", "lost:ugv-2@100", "--trace", trace, "--told", told)
+    seen, logged = tmp_path / "seen.json", tmp_path / "logged.json"
+    run("simulate", plan, "--recover", "--fail", "lost:ugv-2@100", "--trace", trace, "--told", told, "--report", seen)
     simulated = capsys.readouterr().err
     assert "note: ugv-2: lost; at 130 s others were given its part" in simulated
-    assert run("report", told, "--track", trace) == 0
+    assert run("report", told, "--track", trace, "--report", logged) == 0
     driven = capsys.readouterr().err
+    apart = [json.loads(path.read_text())["figures"]["separation"] for path in (seen, logged)]
+    assert apart[0] == pytest.approx(apart[1], abs=0.1)  # from the wreck, which others pass by
+    assert run("report", plan, "--track", trace) == 1
+    assert "note: ugv-1: surveyed lines that the plan gives to others" in capsys.readouterr().err
     assert "finished 1 of 2; lost 1" in " ".join(driven.split())
     assert "note: ugv-2: lost; at 130 s others were given its part" in driven
     assert run("replay", told, "--site", DATA / "plant_yard.geojson") == 2
