@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.text import Annotation
 
 from quarterdeck.exporters.map_furniture import clock, fill, in_sight
 from quarterdeck.exporters.map_site import HALO, Sign
@@ -78,7 +79,7 @@ def _name(chart: Axes, place: tuple[float, float], words: str, *, weight: str) -
     """Write words beside a place: on the first of its sides where they stay on the map and cover no other words."""
     look: dict[str, Any] = {"fontsize": 7, "weight": weight, "bbox": HALO, "annotation_clip": True, "parse_math": False}
     there, frame = [text.get_window_extent() for text in chart.texts], chart.get_window_extent()
-    tried = []
+    tried: list[tuple[bool, int, int, Annotation]] = []
     for dx, dy in ((6, -9), (-6, -9), (6, 9), (-6, 9), (6, -20), (-6, -20)):
         side = "left" if dx > 0 else "right"
         text = chart.annotate(words, place, xytext=(dx, dy), textcoords="offset points", ha=side, zorder=9.5, **look)
