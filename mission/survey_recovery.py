@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from shapely import LineString, MultiLineString, MultiPolygon
 
-from quarterdeck.coverage.metrics import covered_fraction, swath, track_length
+from quarterdeck.coverage.metrics import swath, track_length
 from quarterdeck.geo.errors import InputError
 from quarterdeck.geo.scenario import Area, Scenario, Site, Vehicle, as_multipolygon
 from quarterdeck.mission.changes import Changes
@@ -47,6 +47,8 @@ def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, ch
     driven = _swath([*earlier, *ahead], spacing)
     site = scenario.site.coverable
     missed = as_multipolygon(shapely.difference(site, driven, grid_size=1e-6 * spacing))
+    along = _swath([*earlier, *survey_lines(survey.routes)], spacing)  # a plan's coverage counts corners that turns cut
+    bare = shapely.difference(site, along, grid_size=1e-6 * spacing)
     gaps = as_multipolygon(shapely.intersection(_swath(left, spacing), missed, grid_size=1e-6 * spacing))
     beyond = as_multipolygon(shapely.difference(missed, gaps, grid_size=1e-6 * spacing))
     rim = as_multipolygon(shapely.intersection(_swath(cut, spacing), beyond, grid_size=1e-6 * spacing))
@@ -57,9 +59,7 @@ def survey_from_now(mission: Mission, scenario: Scenario, progress: Progress, ch
         vehicles=scenario.vehicles,
         routes=survey.routes,
         figures={
-            "poc": covered_fraction(
-                [*earlier, *survey_lines(survey.routes)], site, spacing
-            ),  # as a plan's: corners not cut
+            "poc": 1.0 - bare.area / site.area if site.area else 1.0,
             "length": sum(track_length(t) for t in ahead),
             "makespan": max(r.duration for r in survey.routes),
             "energy": sum(r.energy for r in survey.routes),
