@@ -125,7 +125,7 @@ def _broken(status: int, out: bytes, said: str, folder: Path, before: dict[Path,
     if status == 2:
         if made:
             return f"refused, yet wrote {made[0].name}"
-        lines = said.strip().splitlines()
+        lines = [line for line in said.strip().splitlines() if not line.startswith("note: ")]
         usage = lines and lines[0].startswith("Usage:")
         if not lines and out.strip():  # `check` lists the problems of a site as its result
             return ""
