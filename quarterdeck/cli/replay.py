@@ -147,7 +147,8 @@ def report_again(report: dict[str, Any], options: dict[str, Any], within: float)
         given = {
             p.name: p.type_cast_value(context, _tuples(options[p.name])) for p in verb.command.params if p.name in options
         }
-    except (click.BadParameter, TypeError, ValueError, AttributeError) as error:  # click's types are for what is typed
+    # click's types are for what is typed
+    except (click.BadParameter, TypeError, ValueError, OverflowError, AttributeError) as error:
         raise InputError(f"the report's options cannot be used ({error}); run its verb again") from None
     try:
         _, run = verb.execute(**given)

@@ -189,9 +189,12 @@ def test_a_damaged_report_is_one_line(report: Path, tmp_path: Path, capsys, chan
     assert len(err.splitlines()) == 1
 
 
-@pytest.mark.parametrize("option", [{"wind": [0.0]}, {"current": [0, 1, 2]}, {"amcl": 91.0}, {"limits": [["cross_track"]]}])
+@pytest.mark.parametrize(
+    "option",
+    [{"wind": [0.0]}, {"wind": [0, 10**400]}, {"current": [0, 1, 2]}, {"amcl": 91.0}, {"limits": [["cross_track"]]}],
+)
 def test_a_report_of_options_that_nobody_could_give_is_one_line(report: Path, capsys, option: dict) -> None:
-    """Numbers too few or too many, a flag that is a number, a limit without its value."""
+    """Numbers too few, too many or too large, a flag that is a number, a limit without its value."""
     document = json.loads(report.read_text(encoding="utf-8"))
     document["command"]["options"] |= option
     changed = report.with_name("options.json")
