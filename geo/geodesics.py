@@ -131,7 +131,8 @@ def _seen(mesh: Triangulation, places: np.ndarray, corners: np.ndarray) -> tuple
     place, at = tree.query(shapely.points(places), predicate="dwithin", distance=TOUCH)
     others[:, place] |= sees[:, at].toarray()  # a vertex is in several triangles, and looked for in one
     corner = sees[:, tree.nearest(shapely.points(corners))] if len(corners) else csr_array((k, 0), dtype=np.bool_)
-    return corner.indptr, corner.indices, others | others.T
+    # scipy chooses how wide its indices are, the kernel has one signature
+    return corner.indptr.astype(np.int64), corner.indices.astype(np.int64), others | others.T
 
 
 @njit(cache=True)
